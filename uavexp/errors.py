@@ -1,0 +1,35 @@
+"""Errors a user can mend: one line each, never a traceback."""
+
+
+class UavexpError(Exception):
+    """Base of every error that the user can mend; printed as one line, exit code 2."""
+
+
+class ConfigError(UavexpError):
+    """A configuration value is missing, unknown, of the wrong type or out of range."""
+
+
+class WorldError(UavexpError):
+    """A world cannot be made or read: bad file, start in an obstacle, target unreachable."""
+
+
+class RecordError(UavexpError):
+    """A stored record is damaged, of another version, or cannot be written."""
+
+
+def require(condition: bool, message: str) -> None:
+    """Raise `ConfigError(message)` unless `condition` holds (asserts vanish under -O)."""
+    if not condition:
+        raise ConfigError(message)
+
+
+def require_positive(**values: float) -> None:
+    """Raise `ConfigError` unless every value is finite and > 0; names carry the unit suffix."""
+    for name, value in values.items():
+        require(0.0 < value < float("inf"), f"{name} must be > 0 and finite, got {value}")
+
+
+def require_non_negative(**values: float) -> None:
+    """Raise `ConfigError` unless every value is finite and >= 0."""
+    for name, value in values.items():
+        require(0.0 <= value < float("inf"), f"{name} must be >= 0 and finite, got {value}")

@@ -1,0 +1,25 @@
+"""Explorer role: chooses where to fly next."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from uavexp.types import Float, Goal, Limits, Observation
+
+
+class Explorer(Protocol):
+    """Chooses goals at `rate_hz`; built fresh for every trial."""
+
+    rate_hz: float
+
+    def reset(self, flight_height_m: float, limits: Limits) -> None:
+        """Begin a trial at this flight height."""
+        ...
+
+    def select(self, observation: Observation) -> Goal | None:
+        """Return the best goal g* now, or None when no goal is reachable."""
+        ...
+
+    def reject(self, position_m: Float, time_s: float) -> None:
+        """Set a goal aside for a while: no plan leads there."""
+        ...

@@ -1,0 +1,24 @@
+"""Trigger role: decides when to replan. The subject of paper 1."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from uavexp.mapping.base import DistanceField
+from uavexp.types import Decision, Limits, Observation, Trajectory
+
+
+class TriggerPolicy(Protocol):
+    """Asked after every ESDF update; built fresh for every trial."""
+
+    def reset(self, limits: Limits) -> None:
+        """Begin a trial."""
+        ...
+
+    def planned(self, trajectory: Trajectory, field: DistanceField) -> None:
+        """Take note of a new plan and of the live map it was made on (copy what is kept)."""
+        ...
+
+    def decide(self, observation: Observation) -> Decision:
+        """Whether to replan now, and why."""
+        ...

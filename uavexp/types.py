@@ -1,0 +1,300 @@
+"""Everything that flows between the roles: frozen dataclasses in SI units.
+
+World frame: z up. Body frame: x forward, y left, z up. Camera frame: x right, y down,
+z forward. Quaternions are (w, x, y, z), body to world, of unit length.
+Shapes stand beside the types.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from uavexp.mapping.base import DistanceField
+
+Float = npt.NDArray[np.float64]
+Float32 = npt.NDArray[np.float32]
+Bool = npt.NDArray[np.bool_]
+Int = npt.NDArray[np.int64]
+Int32 = npt.NDArray[np.int32]
+UInt8 = npt.NDArray[np.uint8]
+
+
+def _check_shape(name: str, array: npt.NDArray[np.generic], shape: tuple[int | None, ...]) -> None:
+    if array.ndim != len(shape) or any(
+        want is not None and have != want for have, want in zip(array.shape, shape, strict=True)
+    ):
+        raise ValueError(f"{name} must have shape {shape}, got {array.shape}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class State:
+    """Rigid-body state of the vehicle, true or estimated."""
+
+    position_m: Float  # (3,) body centre, world frame
+    velocity_mps: Float  # (3,) world frame
+    quaternion_wxyz: Float  # (4,) body to world
+    body_rate_radps: Float  # (3,) body frame
+
+    def __post_init__(self) -> None:
+        _check_shape("position_m", self.position_m, (3,))
+        _check_shape("velocity_mps", self.velocity_mps, (3,))
+        _check_shape("quaternion_wxyz", self.quaternion_wxyz, (4,))
+        _check_shape("body_rate_radps", self.body_rate_radps, (3,))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reference:
+    """What the controller is asked to follow at one instant."""
+
+    position_m: Float  # (3,)
+    velocity_mps: Float  # (3,)
+    acceleration_mps2: Float  # (3,)
+    yaw_rad: float
+    yaw_rate_radps: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Command:
+    """What the controller asks of the vehicle: collective thrust and attitude."""
+
+    thrust_N: float  # along body z, >= 0
+    quaternion_wxyz: Float  # (4,) wanted attitude, body to world
+    body_rate_radps: Float  # (3,) feed-forward body rate, body frame
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """What the vehicle may be asked to do; planner, controller and brake read these."""
+
+    max_speed_mps: float
+    max_acceleration_mps2: float
+    max_body_rate_radps: float
+    body_size_m: tuple[float, float, float]  # box: length, width, height
+
+    @property
+    def body_radius_m(self) -> float:
+        """Radius of the horizontal circle around the box, whatever its yaw."""
+        return 0.5 * float(np.hypot(self.body_size_m[0], self.body_size_m[1]))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trajectory:
+    """Piecewise polynomial r(t), the common form of every planner's result.
+
+    On piece k, with s = t - breaks_s[k]: r(t) = sum_j coefficients[k, j] s**j.
+    Before the first break it stays at the start, after the last one it holds the end
+    position at rest (the vehicle holds at the end of a trajectory; METHODS.md paper 1).
+    """
+
+    breaks_s: Float  # (K+1,) increasing, absolute trial time
+    coefficients: Float  # (K, D+1, 3) ascending powers
+    at_rest: bool  # whether the end velocity is zero
+
+    def __post_init__(self) -> None:
+        pieces = self.breaks_s.shape[0] - 1
+        _check_shape("coefficients", self.coefficients, (pieces, None, 3))
+        if not (np.isfinite(self.breaks_s).all() and np.isfinite(self.coefficients).all()):
+            raise ValueError("trajectory must be finite")
+        if pieces < 1 or np.any(np.diff(self.breaks_s) <= 0.0):
+            raise ValueError("breaks_s must increase")
+
+    @property
+    def start_s(self) -> float:
+        """Time of the first break, s."""
+        return float(self.breaks_s[0])
+
+    @property
+    def end_s(self) -> float:
+        """Time of the last break, s."""
+        return float(self.breaks_s[-1])
+
+    @property
+    def duration_s(self) -> float:
+        """End minus start, s."""
+        return self.end_s - self.start_s
+
+
+class CellState(StrEnum):
+    """Classes of a map cell; stored as 0, 1, 2 (`mapping.base`)."""
+
+    UNKNOWN = "unknown"
+    FREE = "free"
+    OCCUPIED = "occupied"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scan:
+    """One depth image with the pose it is believed to be taken from.
+
+    Depth is along the optical axis: finite and > 0 is a return; +inf was measured to lie
+    beyond `max_range_m` (free up to there); NaN is no measurement (tells nothing).
+    """
+
+    time_s: float
+    depth_m: Float32  # (H, W)
+    focal_px: tuple[float, float]  # fx, fy
+    centre_px: tuple[float, float]  # cx, cy: optical axis, pixel (0, 0) has its centre at (0, 0)
+    max_range_m: float
+    camera_position_m: Float  # (3,) world
+    camera_rotation: Float  # (3, 3) camera to world
+
+    def __post_init__(self) -> None:
+        _check_shape("depth_m", self.depth_m, (None, None))
+        _check_shape("camera_rotation", self.camera_rotation, (3, 3))
+        if not (np.isfinite(self.camera_position_m).all() and np.isfinite(self.camera_rotation).all()):
+            raise ValueError("camera pose must be finite")
+        if abs(float(np.linalg.det(self.camera_rotation)) - 1.0) > 1e-6:
+            raise ValueError("camera_rotation must be a rotation")
+        if not min(self.focal_px) > 0.0:
+            raise ValueError(f"focal_px must be > 0, got {self.focal_px}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MapUpdate:
+    """The change log of one ESDF update: which voxels changed, and how.
+
+    A voxel first seen in this update is listed with `first_seen` and the old distance
+    of unseen space, the truncation distance. Voxels are flat C-order indices into the
+    field's grid, ascending, each at most once.
+    """
+
+    time_s: float
+    voxel: Int32  # (N,)
+    old_distance_m: Float32  # (N,)
+    new_distance_m: Float32  # (N,)
+    first_seen: Bool  # (N,)
+    occupied: Bool  # (N,) state after the update
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Goal:
+    """Where to fly next."""
+
+    position_m: Float  # (3,)
+    is_target: bool  # the mission's target itself (arrive at rest) or a frontier
+    score: float  # the explorer's, higher is better
+    heading_rad: float = 0.0  # direction of the path at the goal, from the explorer's search
+
+
+class PlanStatus(StrEnum):
+    """How a planning request ended."""
+
+    OK = "ok"
+    START_BLOCKED = "start_blocked"  # the start lies inside a mapped obstacle
+    GOAL_BLOCKED = "goal_blocked"  # the goal lies inside a mapped obstacle
+    NO_PATH = "no_path"  # the search exhausted the map or its budget
+    NOT_CLEAR = "not_clear"  # the optimised curve hits a mapped obstacle
+    LIMITS = "limits"  # no duration keeps the limits from this start
+    SOLVER = "solver"  # the solver failed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanRequest:
+    """What a planner is told; everything it may use."""
+
+    time_s: float  # absolute trial time at which the plan takes effect
+    position_m: Float  # (3,) state on the current reference at `time_s`
+    velocity_mps: Float  # (3,)
+    acceleration_mps2: Float  # (3,)
+    goal: Goal
+    field: DistanceField  # map at the time of the request
+    flight_bounds_m: Float  # (2, 3)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanResult:
+    """A planner's answer: an impossible problem is a status, not an exception."""
+
+    status: PlanStatus
+    trajectory: Trajectory | None = None  # set exactly when status is OK
+    path_m: Float = field(default_factory=lambda: np.zeros((0, 3)))  # (P, 3) initial path
+    reason: str = ""
+    iterations: int = 0  # of the solver
+    expansions: int = 0  # of the graph search
+    wall_search_s: float = 0.0
+    wall_optimise_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        if (self.trajectory is not None) != (self.status is PlanStatus.OK):
+            raise ValueError(f"a plan with status {self.status} must have a trajectory iff ok")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Observation:
+    """What the deciding roles (explorer, trigger, safety, mission) see at one instant.
+
+    All of it is what the vehicle believes; nothing here is the truth.
+    """
+
+    time_s: float
+    state: State  # estimated
+    reference: Reference  # the reference being flown
+    trajectory: Trajectory | None  # being flown; None before the first plan
+    field: DistanceField
+    update: MapUpdate  # of the latest ESDF update
+    goal: Goal | None  # of the trajectory being flown
+    best_goal: Goal | None  # the explorer's latest choice g*
+    target_m: Float | None  # (3,) mission target; None when exploring
+    flight_bounds_m: Float  # (2, 3)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Decision:
+    """Whether to replan, and the named cause."""
+
+    replan: bool
+    cause: str = ""  # e.g. "map", "goal", "clock"; never empty when `replan`
+    score: float = 0.0  # how far over the threshold, policy's own unit
+
+    def __post_init__(self) -> None:
+        if self.replan and not self.cause:
+            raise ValueError("a replan must name its cause")
+
+
+class Outcome(StrEnum):
+    """How a flight ended. Contacts are counted apart: success = reached without contact."""
+
+    REACHED = "reached"  # within the tolerance of the target, in truth
+    EXPLORED = "explored"  # no reachable frontier is left
+    TIMEOUT = "timeout"  # the mission's time limit passed
+    NO_PLAN = "no_plan"  # no plan was ever found from the start
+    STUCK = "stuck"  # holding, and every goal has been tried and failed
+    ERROR = "error"  # the trial itself raised; the record has the traceback
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Difficulty:
+    """How hard a world is, measured on the true geometry."""
+
+    clutter_density: float  # occupied share of the flight volume at the flight height band
+    narrowest_gap_m: float  # 2 x smallest clearance along the shortest path
+    straight_line_m: float
+    shortest_path_m: float  # true shortest collision-free path at the required clearance
+
+    @property
+    def detour(self) -> float:
+        """Shortest path over straight line, >= 1."""
+        return self.shortest_path_m / self.straight_line_m if self.straight_line_m > 0.0 else 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class World:
+    """True geometry and a task in it."""
+
+    name: str  # option name, e.g. "warehouse"
+    vertices_m: Float32  # (V, 3)
+    triangles: Int32  # (F, 3)
+    bounds_m: Float  # (2, 3) box that the map covers
+    flight_bounds_m: Float  # (2, 3) box the body centre may not leave
+    start_m: Float  # (3,)
+    start_yaw_rad: float
+    target_m: Float  # (3,)
+    shortest_path: Float  # (P, 3) true shortest path, start to target
+    difficulty: Difficulty
+    digest: str  # sha256 over geometry and task
