@@ -1,11 +1,16 @@
 """Errors a user can mend: one line each, never a traceback."""
 
+from enum import StrEnum
+from typing import TypeVar
+
+Option = TypeVar("Option", bound=StrEnum)
+
 
 class UavexpError(Exception):
     """Base of every error that the user can mend; printed as one line, exit code 2."""
 
 
-class ConfigError(UavexpError):
+class ConfigError(UavexpError, ValueError):
     """A configuration value is missing, unknown, of the wrong type or out of range."""
 
 
@@ -33,3 +38,12 @@ def require_non_negative(**values: float) -> None:
     """Raise `ConfigError` unless every value is finite and >= 0."""
     for name, value in values.items():
         require(0.0 <= value < float("inf"), f"{name} must be >= 0 and finite, got {value}")
+
+
+def require_option(name: str, value: str, options: type[Option]) -> Option:
+    """Return the member of `options` that `value` names; raise `ConfigError` listing them."""
+    try:
+        return options(value)
+    except ValueError:
+        allowed = " | ".join(options)
+        raise ConfigError(f"{name} must be {allowed}, got {value!r}") from None

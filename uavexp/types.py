@@ -250,7 +250,8 @@ class Decision:
 
     replan: bool
     cause: str = ""  # e.g. "map", "goal", "clock"; never empty when `replan`
-    score: float = 0.0  # how far over the threshold, policy's own unit
+    score: float = 0.0  # size of the event over its threshold; policies without one say 0
+    voxel: Int32 = field(default_factory=lambda: np.zeros(0, dtype=np.int32))  # (N,) whose change fired
 
     def __post_init__(self) -> None:
         if self.replan and not self.cause:
@@ -298,3 +299,64 @@ class World:
     shortest_path: Float  # (P, 3) true shortest path, start to target
     difficulty: Difficulty
     digest: str  # sha256 over geometry and task
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Replan:
+    """One planning request after the first, and what came of it (the first plan is number 0)."""
+
+    time_s: float  # of the trigger
+    effective_s: float  # when the new plan took over; NaN when it failed
+    cause: str  # "first", "map", "goal", "clock", "brake", ...
+    score: float
+    position_m: Float  # (3,) true position at the trigger
+    goal_m: Float  # (3,)
+    status: PlanStatus
+    reason: str
+    path_change_m: float  # largest distance of the old remaining path from the new one; NaN if none
+    iterations: int
+    expansions: int
+    changed_m: Float32  # (N, 3) voxel centres whose change fired it (figure 10); may be empty
+    trajectory_m: Float32  # (P, 3) samples of the new trajectory (drawn in pictures); may be empty
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contact:
+    """One contact of the body box with true geometry, from touch until it has ended."""
+
+    start_s: float
+    end_s: float
+    position_m: Float  # (3,) body centre at first touch
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrialLog:
+    """Everything a flight leaves behind; metrics are recomputed from it without flying."""
+
+    outcome: Outcome
+    reason: str  # one sentence; empty when the outcome says it all
+    step_s: float
+    # one row per simulation step, row 0 is the start
+    time_s: Float  # (T,)
+    position_m: Float  # (T, 3) true
+    velocity_mps: Float  # (T, 3) true
+    quaternion_wxyz: Float  # (T, 4) true
+    estimated_position_m: Float  # (T, 3)
+    reference_position_m: Float  # (T, 3)
+    reference_acceleration_mps2: Float  # (T, 3)
+    clearance_m: Float  # (T,) true distance of the body centre to the nearest surface
+    # one row per ESDF update
+    tick_s: Float  # (M,)
+    esdf_clearance_m: Float  # (M,) mapped distance at the estimated position
+    changed_voxels: Int  # (M,) size of the change log
+    decision_score: Float  # (M,)
+    # events
+    replans: tuple[Replan, ...]  # the first plan included, as number 0
+    dropped_triggers: int  # triggers while a request was in flight
+    contacts: tuple[Contact, ...]
+    goals_m: Float  # (G, 3) distinct goals pursued, in order
+    seen_share: float  # observed share of the reachable free volume; NaN when not asked for
+    # the map at the end, for pictures: occupied voxel centres
+    mapped_m: Float32  # (N, 3)
+    # clock times, never part of the record: name -> seconds of each call
+    wall_s: dict[str, Float] = field(default_factory=dict)

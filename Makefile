@@ -1,0 +1,61 @@
+# Two commands matter:  make run  (fly a trial)  and  make test.
+# make run ARGS="strategy=tbr seed=0:3"      make run PYTHON=python3.12      make lock LOCKFLAGS=--upgrade
+
+ARGS ?= strategy=mcr seed=0
+VENV ?= .venv
+PYTHONS ?= python3.13 python3.12 python3.11 python3
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+
+# The first interpreter that really runs (a shim on the path may not) and is a version we support.
+SUPPORTED := import sys; (3, 11) <= sys.version_info < (3, 14) or sys.exit(1); print(sys.executable)
+PYTHON ?= $(shell for name in $(PYTHONS); do $$name -c '$(SUPPORTED)' 2>/dev/null && break; done)
+UV ?= $(shell uv --version >/dev/null 2>&1 && echo uv)
+
+.PHONY: run test check bench lock clean
+.DELETE_ON_ERROR:
+
+run: $(STAMP)
+	@$(BIN)/python -m uavexp $(ARGS)
+
+test: $(STAMP)
+	@$(BIN)/python -m pytest $(ARGS_TEST)
+
+check: $(STAMP)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+bench: $(STAMP)
+	@$(BIN)/python -m benchmarks
+
+# The environment: exactly the locked packages, then this project itself, editable, built by the
+# locked back end. Remade when the lock changes; an interpreter that no longer runs is replaced.
+$(STAMP): requirements.lock
+	@echo "Setting up $(VENV) from requirements.lock (once; about 1.7 GB) ..."
+ifneq ($(UV),)
+	@$(BIN)/python -c '$(SUPPORTED)' >/dev/null 2>&1 || \
+	    $(UV) venv --quiet --clear --python "$(or $(PYTHON),>=3.11$(comma)<3.14)" $(VENV)
+	@$(UV) pip install --quiet --python $(BIN)/python --require-hashes -r requirements.lock
+	@$(UV) pip install --quiet --python $(BIN)/python --no-deps --no-build-isolation -e .
+else
+	@test -n "$(PYTHON)" || { echo "uavexp needs Python 3.11, 3.12 or 3.13; none of these runs: $(PYTHONS)" >&2; exit 1; }
+	@$(BIN)/python -c '$(SUPPORTED); import pip' >/dev/null 2>&1 || $(PYTHON) -m venv --clear $(VENV) || \
+	    { echo "$(PYTHON) cannot make environments; on Debian or Ubuntu: apt-get install python3-venv" >&2; exit 1; }
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+endif
+	@touch $@
+
+# Every supported Python and platform gets the same versions; the file names no host.
+lock:
+	@test -n "$(UV)" || { echo "make lock needs uv: pip install uv" >&2; exit 1; }
+	$(UV) pip compile pyproject.toml --quiet --extra test --universal --python-version 3.11 \
+	    --fork-strategy fewest --generate-hashes --no-emit-index-url --no-emit-find-links \
+	    --custom-compile-command "make lock" --output-file requirements.lock $(LOCKFLAGS)
+
+clean:
+	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis dist build
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+comma := ,

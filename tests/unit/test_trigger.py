@@ -1,0 +1,252 @@
+"""The replanning policies against brute-force readings of their definitions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.fields import box, empty, field_from
+from uavexp.errors import ConfigError
+from uavexp.mapping.base import DistanceField
+from uavexp.trigger.change import changed_near
+from uavexp.trigger.mcr import Mcr
+from uavexp.trigger.ssp import Ssp
+from uavexp.trigger.tbr import Tbr
+from uavexp.types import Decision, Goal, Limits, MapUpdate, Observation, Reference, State, Trajectory
+
+LIMITS = Limits(
+    max_speed_mps=2.5, max_acceleration_mps2=2.5, max_body_rate_radps=2.0, body_size_m=(0.32, 0.32, 0.12)
+)
+# Straight along x at 1 m/s, y = 2.05, z = 1.05, from t = 1 s to 6 s.
+STRAIGHT = Trajectory(
+    breaks_s=np.array([1.0, 6.0]),
+    coefficients=np.array([[[0.5, 2.05, 1.05], [1.0, 0.0, 0.0]]]),
+    at_rest=False,
+)
+
+
+def room(*boxes: tuple[tuple[float, ...], tuple[float, ...]]) -> DistanceField:
+    grid = empty((7.0, 4.0, 2.0))
+    for low, high in boxes:
+        box(grid, low, high)
+    return field_from(grid, max_distance_m=2.0)
+
+
+def change(before: DistanceField, after: DistanceField, first_seen: bool = False) -> MapUpdate:
+    voxel = np.flatnonzero(before.distance != after.distance).astype(np.int32)
+    return MapUpdate(
+        time_s=0.0,
+        voxel=voxel,
+        old_distance_m=before.distance.ravel()[voxel],
+        new_distance_m=after.distance.ravel()[voxel],
+        first_seen=np.full(len(voxel), first_seen),
+        occupied=after.state.ravel()[voxel] == 2,
+    )
+
+
+def goal_at(x: float) -> Goal:
+    return Goal(position_m=np.array([x, 2.05, 1.05]), is_target=False, score=0.0)
+
+
+def observe(
+    field: DistanceField,
+    update: MapUpdate,
+    time_s: float = 1.5,
+    goal: Goal | None = None,
+    best: Goal | None = None,
+) -> Observation:
+    zero = np.zeros(3)
+    return Observation(
+        time_s=time_s,
+        state=State(
+            position_m=zero, velocity_mps=zero, quaternion_wxyz=np.array([1.0, 0, 0, 0]), body_rate_radps=zero
+        ),
+        reference=Reference(position_m=zero, velocity_mps=zero, acceleration_mps2=zero, yaw_rad=0.0),
+        trajectory=STRAIGHT,
+        field=field,
+        update=update,
+        goal=goal,
+        best_goal=best,
+        target_m=None,
+        flight_bounds_m=np.zeros((2, 3)),
+    )
+
+
+def decide(policy: Mcr, before: DistanceField, after: DistanceField, **kwargs: object) -> Decision:
+    policy.reset(LIMITS)
+    policy.planned(STRAIGHT, before)
+    return policy.decide(replace(observe(after, change(before, after)), **kwargs))
+
+
+LITERAL = {
+    "judge": "region",
+    "since": "update",
+    "goal_since": "update",
+    "extent": "whole",
+    "first_sight": "all",
+    "sign": "both",
+}
+
+
+def test_changed_near_is_the_equation_by_brute_force() -> None:
+    rng = np.random.default_rng(0)
+    shape = np.array([9, 7, 5])
+    voxel = np.sort(rng.choice(int(shape.prod()), 200, replace=False)).astype(np.int32)
+    old, new = rng.uniform(0, 1, 200).astype(np.float32), rng.uniform(0, 1, 200).astype(np.float32)
+    origin, points = np.array([-1.0, 2.0, 0.3]), rng.uniform(0, 1, (6, 3)) * [2, 2, 1] + [-1.0, 2.0, 0.3]
+    for both in (False, True):
+        near, largest = changed_near(voxel, old, new, shape, origin, 0.2, points, 0.5, 0.3, both)
+        centres = origin + 0.2 * (np.stack(np.unravel_index(voxel, shape), axis=1) + 0.5)
+        inside = (np.linalg.norm(centres[:, None] - points[None], axis=2) < 0.5).any(axis=1)
+        drop = old.astype(float) - new.astype(float)
+        size = np.abs(drop) if both else drop
+        np.testing.assert_array_equal(near, voxel[inside & (size > 0.3)])
+        assert largest == pytest.approx(size[inside].max())
+
+
+def test_literal_fires_on_any_voxel_in_the_tube_and_on_none_outside() -> None:
+    free = room()
+    beside = room(((3.0, 3.2, 1.0), (3.2, 3.4, 1.2)))  # 1.15 m from the path
+    assert decide(Mcr(**LITERAL), free, beside).cause == "map"
+    assert not decide(Mcr(**LITERAL, monitor_radius_m=0.5, delta_map_m=1.3), free, beside).replan
+
+
+def test_path_rule_ignores_a_change_that_leaves_the_plan_valid() -> None:
+    free = room()
+    beside, on_it = room(((3.0, 3.2, 1.0), (3.2, 3.4, 1.2))), room(((3.0, 2.3, 1.0), (3.2, 2.5, 1.2)))
+    assert not decide(Mcr(), free, beside).replan
+    fired = decide(Mcr(), free, on_it)
+    assert fired.replan
+    assert fired.cause == "map"
+    assert len(fired.voxel) > 0
+    assert fired.score > 1.0
+
+
+def test_path_rule_waits_until_the_violation_is_near() -> None:
+    free, ahead = room(), room(((4.9, 2.0, 1.0), (5.1, 2.1, 1.2)))  # reached at about t = 5.5 s
+    assert not decide(Mcr(horizon_s=2.0), free, ahead, time_s=1.5).replan
+    assert decide(Mcr(horizon_s=2.0), free, ahead, time_s=4.0).replan
+    assert decide(Mcr(horizon_s=5.0), free, ahead, time_s=1.5).replan
+
+
+def test_only_the_remaining_trajectory_counts_unless_whole() -> None:
+    free, behind = room(), room(((1.0, 2.0, 1.0), (1.2, 2.1, 1.2)))
+    assert not decide(Mcr(), free, behind, time_s=3.0).replan
+    assert decide(Mcr(extent="whole"), free, behind, time_s=3.0).replan
+
+
+def test_changes_accumulate_since_the_plan_but_not_between_updates() -> None:
+    """Two steps of 0.1 m are a drop of 0.2 m since the plan, and of 0.1 m since the update."""
+    steps = [room(((2.0, y, 1.0), (3.0, y + 0.1, 1.1))) for y in (2.7, 2.6, 2.5)]
+    for since, expected in (("plan", True), ("update", False)):
+        policy = Mcr(since=since, valid_clearance_m=0.6)
+        policy.reset(LIMITS)
+        policy.planned(STRAIGHT, steps[0])
+        fired = [
+            policy.decide(observe(b, change(a, b))).replan for a, b in zip(steps, steps[1:], strict=False)
+        ]
+        assert any(fired) is expected
+
+
+def test_growing_clearance_is_no_contraction() -> None:
+    near, free = room(((3.0, 2.3, 1.0), (3.2, 2.5, 1.2))), room()
+    assert not decide(Mcr(**{**LITERAL, "sign": "contraction"}), near, free).replan
+    assert decide(Mcr(**LITERAL), near, free).replan
+
+
+@pytest.mark.parametrize(("first_sight", "expected"), [("none", False), ("occupied", True), ("all", True)])
+def test_first_sights_count_as_configured(first_sight: str, expected: bool) -> None:
+    free, wall = room(), room(((3.0, 2.0, 1.0), (3.2, 2.2, 1.2)))
+    policy = Mcr(**{**LITERAL, "first_sight": first_sight})
+    policy.reset(LIMITS)
+    policy.planned(STRAIGHT, free)
+    assert policy.decide(observe(wall, change(free, wall, first_seen=True))).replan is expected
+
+
+def test_first_seen_free_space_never_fires_the_default() -> None:
+    free = room()
+    update = replace(
+        change(free, free),
+        voxel=np.arange(100, dtype=np.int32),
+        old_distance_m=np.full(100, 2.0, dtype=np.float32),
+        new_distance_m=np.full(100, 0.5, dtype=np.float32),
+        first_seen=np.ones(100, dtype=bool),
+        occupied=np.zeros(100, dtype=bool),
+    )
+    for policy in (Mcr(), Mcr(judge="region", since="update")):
+        policy.reset(LIMITS)
+        policy.planned(STRAIGHT, free)
+        assert not policy.decide(observe(free, update)).replan
+
+
+def test_goal_drift_is_measured_against_the_flown_goal_or_the_previous_one() -> None:
+    free = room()
+    none = change(free, free)
+    assert decide(Mcr(), free, free, goal=goal_at(3.0), best_goal=goal_at(3.29)).replan is False
+    drifted = decide(Mcr(), free, free, goal=goal_at(3.0), best_goal=goal_at(3.31))
+    assert drifted.cause == "goal"
+    literal = Mcr(**LITERAL)
+    literal.reset(LIMITS)
+    literal.planned(STRAIGHT, free)
+    fired = [
+        literal.decide(observe(free, none, goal=goal_at(0.0), best=goal_at(x))).replan
+        for x in (3.0, 3.2, 3.6, 3.6)
+    ]
+    assert fired == [False, False, True, False]
+
+
+def test_firing_is_monotone_in_the_thresholds() -> None:
+    rng = np.random.default_rng(1)
+    free = room()
+    for _ in range(20):
+        y = rng.uniform(2.2, 3.0)
+        after = room(((3.0, y, 1.0), (3.2, y + 0.1, 1.2)))
+        fired = [
+            decide(Mcr(delta_map_m=d, valid_clearance_m=0.8), free, after).replan
+            for d in (0.05, 0.3, 0.9, 1.5)
+        ]
+        assert fired == sorted(fired, reverse=True)
+        fired = [decide(Mcr(valid_clearance_m=c), free, after).replan for c in (0.2, 0.4, 0.6, 0.9)]
+        assert fired == sorted(fired)
+
+
+def test_no_replan_within_the_least_interval() -> None:
+    free, on_it = room(), room(((3.0, 2.0, 1.0), (3.2, 2.2, 1.2)))
+    assert not decide(Mcr(min_interval_s=0.6), free, on_it, time_s=1.5).replan
+    assert decide(Mcr(min_interval_s=0.4), free, on_it, time_s=1.5).replan
+
+
+@pytest.mark.parametrize("interval_s", [0.5, 1.0, 0.7, 5.0])
+def test_clock_fires_once_per_interval(interval_s: float) -> None:
+    free = room()
+    policy = Tbr(interval_s=interval_s)
+    policy.reset(LIMITS)
+    ticks = np.arange(301) * 0.1
+    fired = [policy.decide(observe(free, change(free, free), time_s=t)).replan for t in ticks]
+    assert sum(fired) == int(30.0 / interval_s + 1e-9)
+    assert not fired[0]
+
+
+def test_single_shot_never_replans() -> None:
+    free, blocked = room(), room(((3.0, 2.0, 1.0), (3.2, 2.2, 1.2)))
+    policy = Ssp()
+    policy.reset(LIMITS)
+    policy.planned(STRAIGHT, free)
+    assert not policy.decide(observe(blocked, change(free, blocked), best=goal_at(9.0))).replan
+
+
+@pytest.mark.parametrize(
+    ("bad", "words"),
+    [
+        ({"delta_map_m": -0.1}, "delta_map_m must be > 0"),
+        ({"delta_goal_m": float("nan")}, "delta_goal_m must be > 0"),
+        ({"monitor_radius_m": float("inf")}, "monitor_radius_m must be > 0 and finite"),
+        ({"min_changed_voxels": 0}, "min_changed_voxels must be >= 1"),
+        ({"judge": "corridor"}, "judge must be path | region, got 'corridor'"),
+    ],
+)
+def test_bad_values_are_refused_by_name(bad: dict[str, object], words: str) -> None:
+    with pytest.raises(ConfigError, match=words.replace("|", r"\|")):
+        Mcr(**bad)

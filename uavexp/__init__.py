@@ -1,0 +1,49 @@
+"""Seeded, batch-run experiments on when a UAV should replan in unknown indoor spaces.
+
+Importing the package loads nothing heavy. It pins every thread pool to one thread, before
+numpy can start them: matrix products change bits between one thread and two, and a
+result must not depend on the machine's core count.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from uavexp.cli.flight import Trial
+
+__version__ = "0.1.0"
+
+_THREAD_VARIABLES = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "BLIS_NUM_THREADS",
+    "NUMEXPR_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+    "TBB_NUM_THREADS",
+    "NUMBA_NUM_THREADS",
+)
+# overridden, not defaulted: a user's OMP_NUM_THREADS=2 would change results
+os.environ.update(dict.fromkeys(_THREAD_VARIABLES, "1"))
+
+
+def fly(*overrides: str, **values: Any) -> Trial:
+    """Fly one trial and return it; nothing is written to disk.
+
+    Args:
+        overrides: as on the command line, e.g. `"trigger.delta_map_m=0.1"`.
+        values: the same as keywords, e.g. `strategy="mcr", seed=0`; keys with a dot go
+            through `**{"world.size_m": [12, 8, 3]}`.
+
+    Returns:
+        The trial: configuration, world, log and metrics.
+
+    Raises:
+        ConfigError: a wrong key or value, or more than one cell or seed.
+        WorldError: the world cannot be made or read.
+    """
+    from uavexp.cli.flight import fly_overrides
+
+    return fly_overrides(overrides, values)

@@ -1,0 +1,74 @@
+"""The command line: parse, compose, check, hand on (`python -m uavexp --help`)."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from typing import NoReturn
+
+from uavexp.errors import ConfigError, UavexpError
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        raise ConfigError(f"{message}; see --help")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command line and return its exit code: 0, 1 a trial raised, 2 bad input, 130 interrupted."""
+    os.environ["MPLBACKEND"] = "Agg"
+    try:
+        return _run(_parse(sys.argv[1:] if arguments is None else arguments))
+    except UavexpError as error:
+        sys.stderr.write(f"error: {' '.join(str(error).split())}\n")
+        return 2
+    except KeyboardInterrupt:
+        sys.stderr.write("interrupted\n")
+        return 130
+
+
+def _parse(arguments: Sequence[str]) -> argparse.Namespace:
+    parser = _Parser(prog="uavexp", add_help=False, allow_abbrev=False)
+    parser.add_argument("overrides", nargs="*")
+    parser.add_argument("-h", "--help", action="store_true")
+    parser.add_argument("-m", "--multirun", action="store_true")
+    parser.add_argument("--cfg", choices=("job", "hydra", "all"))
+    parser.add_argument("--info", action="store_true")
+    parser.add_argument("--config-dir", "-cd", metavar="DIR")
+    return parser.parse_intermixed_args(arguments)
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from uavexp.cli.options import user_folder
+
+    folder = user_folder(arguments.config_dir) if arguments.config_dir is not None else None
+    if arguments.help:
+        from uavexp.cli.helptext import group_names, help_text
+
+        group = next((word for word in arguments.overrides if word in group_names(folder)), None)
+        sys.stdout.write(help_text(folder, group))
+        return 0
+
+    from uavexp.cli.composition import Composer
+    from uavexp.cli.overrides import parse_settings
+
+    composer = Composer(user_folder=folder)
+    command = composer.command(parse_settings(arguments.overrides))
+    if arguments.cfg or arguments.info:
+        from uavexp.cli.show import config_text, info_text
+
+        sys.stdout.write(
+            info_text(folder) if arguments.info else config_text(composer, command, arguments.cfg)
+        )
+        return 0
+
+    from uavexp.cli.run import execute
+    from uavexp.cli.terminal import Terminal
+
+    return execute(command, Terminal(), folder)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,162 @@
+"""Configuration to components, checked against their annotations and protocols.
+
+A configuration is plain data here: one dict per group with `_target_` and parameters, and
+the numbers that belong to no group. Nothing but a class defined in a trusted package is
+ever looked up (`uavexp.trust` has refused the rest before), and only its constructor
+is called.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from uavexp.errors import ConfigError, UavexpError
+from uavexp.parameters import check_value, nearest, parameter_types, plain, required_parameters
+from uavexp.trust import check_trust, is_trusted
+
+if TYPE_CHECKING:
+    from uavexp.trial import Parts
+
+GROUPS = (
+    "world",
+    "sensor",
+    "estimator",
+    "mapping",
+    "explorer",
+    "trigger",
+    "planner",
+    "controller",
+    "vehicle",
+    "safety",
+    "mission",
+)
+TOP_LEVEL = ("step_s", "latency_s", "start_bubble_m", "restart_error_m", "stuck_s", "yaw_lookahead_s")
+TARGET = "_target_"
+
+
+def check_config(config: Mapping[str, Any], options: Mapping[str, str]) -> dict[str, Any]:
+    """Return the configuration in its components' own types, as plain data.
+
+    Equal configurations come out equal whatever was typed (5 or 5.0), so that they name
+    the same trial.
+
+    Args:
+        config: one tree per group and the top-level numbers.
+        options: chosen option per group, for messages.
+
+    Raises:
+        ConfigError: a wrong class, an unknown or missing parameter, a wrong type; every
+            constructor has accepted its values when this returns.
+    """
+    checked: dict[str, Any] = {}
+    for group in GROUPS:
+        tree = config[group]
+        if not isinstance(tree, Mapping) or TARGET not in tree:
+            raise ConfigError(f"{group}={options[group]}: the option has no {TARGET}")
+        checked[group] = {TARGET: tree[TARGET], **plain(_arguments(group, tree))}
+    for key in TOP_LEVEL:
+        checked[key] = check_value(key, config[key], float)
+    build(checked)
+    return checked
+
+
+def build(config: Mapping[str, Any]) -> Parts:
+    """Build every component of a checked configuration, fresh.
+
+    Raises:
+        ConfigError: a constructor or a protocol refuses.
+    """
+    from uavexp.trial import Parts
+
+    check_trust(config)
+    components = {group: build_component(group, config[group]) for group in GROUPS}
+    try:
+        parts = Parts(**components, **{key: config[key] for key in TOP_LEVEL})
+    except ArithmeticError as error:
+        raise ConfigError(f"a rate or period does not fit the step: {error}") from error
+    _check_monitored_distance(parts)
+    return parts
+
+
+def build_component(group: str, tree: Mapping[str, Any]) -> Any:
+    """Build one component and check that it speaks its group's protocol."""
+    cls = component_class(group, tree[TARGET])
+    try:
+        component = cls(**_arguments(group, tree))
+    except UavexpError as error:
+        raise ConfigError(f"{group}.{error}") from error
+    except (TypeError, ValueError, ArithmeticError) as error:
+        raise ConfigError(f"{group}: {cls.__name__} cannot be made: {error}") from error
+    lacking = [name for name in protocol_members(group) if not hasattr(component, name)]
+    if lacking:
+        raise ConfigError(
+            f"{group}: {cls.__module__}.{cls.__name__} is no {group}, it lacks {', '.join(lacking)}"
+        )
+    return component
+
+
+def component_class(group: str, target: str) -> type:
+    """Class that a `_target_` names: defined in a trusted package, a built-in one in its group's."""
+    module_name, _, name = target.rpartition(".")
+    if target.startswith("uavexp.") and not module_name.startswith(f"uavexp.{group}."):
+        raise ConfigError(f"{group}.{TARGET}={target} is no option of {group}")
+    try:
+        module = importlib.import_module(module_name)
+    except ModuleNotFoundError as error:
+        raise ConfigError(f"{group}.{TARGET}={target}: {error}") from error
+    cls = getattr(module, name, None)
+    # a class reached through a trusted module but made elsewhere (pathlib.Path) is a stranger's
+    if not isinstance(cls, type) or not is_trusted(f"{cls.__module__}.{name}"):
+        raise ConfigError(f"{group}.{TARGET}={target}: {module_name} defines no class {name}")
+    return cls
+
+
+def protocol_members(group: str) -> list[str]:
+    """Names of the methods and attributes that a group's protocol asks for."""
+    protocol = protocol_of(group)
+    own = [name for name in vars(protocol) if not name.startswith("_")]
+    return sorted({*own, *vars(protocol).get("__annotations__", {})})
+
+
+def protocol_of(group: str) -> type:
+    """The one protocol that `uavexp/<group>/base.py` defines."""
+    base = importlib.import_module(f"uavexp.{group}.base")
+    protocols = [
+        item
+        for item in vars(base).values()
+        if isinstance(item, type)
+        and item.__module__ == base.__name__
+        and getattr(item, "_is_protocol", False)
+    ]
+    if len(protocols) != 1:
+        raise TypeError(f"uavexp/{group}/base.py must define one protocol, it has {len(protocols)}")
+    return protocols[0]
+
+
+def _arguments(group: str, tree: Mapping[str, Any]) -> dict[str, Any]:
+    """Constructor arguments in their annotated types."""
+    cls = component_class(group, tree[TARGET])
+    allowed = parameter_types(cls)
+    given = {key: value for key, value in tree.items() if key != TARGET}
+    for key in given:
+        if key not in allowed:
+            raise ConfigError(
+                f"{group}.{key}: {cls.__name__} has no parameter '{key}'{nearest(key, allowed)}; "
+                f"it has {', '.join(allowed) or 'none'}"
+            )
+    for key in required_parameters(cls):
+        if key not in given:
+            raise ConfigError(f"{group}.{key} must be given: type {group}.{key}=VALUE")
+    return {key: check_value(f"{group}.{key}", value, allowed[key]) for key, value in given.items()}
+
+
+def _check_monitored_distance(parts: Parts) -> None:
+    """A field truncated below the trigger's radius hides changes inside it (paper 1)."""
+    radius_m = getattr(parts.trigger, "monitor_radius_m", None)
+    reach_m = getattr(parts.mapping, "max_distance_m", None)
+    if radius_m is not None and reach_m is not None and reach_m < radius_m:
+        raise ConfigError(
+            f"mapping.max_distance_m must be >= trigger.monitor_radius_m = {radius_m}, got {reach_m}"
+        )

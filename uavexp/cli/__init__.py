@@ -1,0 +1,1 @@
+"""The command line in parts: options, overrides, composition, trust, flights, output."""

@@ -1,0 +1,269 @@
+"""Overrides in, checked cells out: the only module that composes with Hydra.
+
+Hydra composes the chosen options once per combination of options; the values are applied
+here, so that a grid over a parameter costs nothing and each mistake is told in the user's
+own words. The resolved tree is plain data from here on and is checked (`trust`,
+`uavexp.build.check_config`) before anything is built.
+"""
+
+from __future__ import annotations
+
+import copy
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from uavexp.build import GROUPS, TOP_LEVEL, check_config
+from uavexp.cli.options import EXPERIMENT_GROUP, PRESET_GROUP, list_options
+from uavexp.cli.overrides import Setting, expand_grid, expand_seeds, quoted
+from uavexp.errors import ConfigError
+from uavexp.parameters import nearest
+from uavexp.paths import conf_folder
+from uavexp.trust import check_trust
+
+TRIGGER_GROUP = "trigger"  # what presets choose
+CONFIG_NAME = "config"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Cell:
+    """One composed configuration; with a seed it is a trial."""
+
+    strategy: str  # the preset's name, else the trigger's
+    options: dict[str, str]  # group -> option
+    config: dict[str, Any]  # plain, resolved, checked: groups, step_s, latency_s
+    settings: tuple[Setting, ...]  # what was typed for it, seed and out apart
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Command:
+    """What one command line asks for."""
+
+    cells: tuple[Cell, ...]
+    seeds: tuple[int, ...]
+    out: str | None
+
+
+@dataclass(slots=True, kw_only=True)
+class Composer:
+    """Composes cells from the shipped configuration and, optionally, a user's folder."""
+
+    user_folder: Path | None = None
+    options: dict[str, dict[str, Path]] = field(init=False)
+    _cache: dict[tuple[tuple[str, str], ...], dict[str, Any]] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        folders = [conf_folder(), *([self.user_folder] if self.user_folder else [])]
+        self.options = list_options(folders)
+        self._cache = {}
+
+    def command(self, settings: Sequence[Setting]) -> Command:
+        """Expand, compose and check everything a command line asks for.
+
+        Raises:
+            ConfigError: the first thing that is wrong.
+        """
+        ours = {setting.key: setting for setting in settings if setting.key in ("seed", "out")}
+        grid = expand_grid([setting for setting in settings if setting.key not in ours])
+        cells = tuple(self.cell(settings) for settings in grid)
+        _refuse_equal_cells(cells)
+        defaults = self.compose(grid[0])
+        seeds = expand_seeds(ours["seed"].values if "seed" in ours else [defaults["seed"]])
+        out = ours["out"].values if "out" in ours else (defaults["out"],)
+        if len(out) != 1 or not isinstance(out[0], str | None) or out[0] == "":
+            raise ConfigError(f"out must be one folder, got {', '.join(map(repr, out))}")
+        return Command(cells=cells, seeds=seeds, out=out[0])
+
+    def cell(self, settings: Sequence[Setting]) -> Cell:
+        """Compose and check one cell; each setting has one value."""
+        tree = self.compose(settings)
+        options = {group: tree["hydra"]["runtime"]["choices"][group] for group in GROUPS}
+        config = check_config({key: tree[key] for key in (*GROUPS, *TOP_LEVEL)}, options)
+        strategy = tree["hydra"]["runtime"]["choices"].get(PRESET_GROUP)
+        return Cell(
+            strategy=strategy or options[TRIGGER_GROUP],
+            options=options,
+            config=config,
+            settings=tuple(settings),
+        )
+
+    def compose(self, settings: Sequence[Setting]) -> dict[str, Any]:
+        """Compose one cell into a plain, resolved, trusted tree, `hydra` included."""
+        chosen, values = self._split(settings)
+        tree = copy.deepcopy(self._compose_options(tuple(sorted(chosen.items()))))
+        for setting in values:
+            self._apply(tree, setting)
+        tree = _resolve(tree)
+        check_trust(tree)
+        return tree
+
+    def _split(self, settings: Sequence[Setting]) -> tuple[dict[str, str], list[Setting]]:
+        """Options chosen by group, and the settings that change values."""
+        chosen: dict[str, str] = {}
+        values: list[Setting] = []
+        for setting in settings:
+            if setting.key in self.options or setting.key == EXPERIMENT_GROUP:
+                if setting.values[0] is None and setting.key == EXPERIMENT_GROUP:
+                    continue
+                chosen[setting.key] = self._option(setting.key, setting.values[0])
+            else:
+                values.append(setting)
+        return chosen, values
+
+    def _option(self, group: str, name: Any) -> str:
+        known = self.options.get(group, {})
+        if isinstance(name, str) and name in known:
+            return name
+        if group == EXPERIMENT_GROUP:
+            raise ConfigError(f"no such experiment: {name}, available: {', '.join(known) or 'none'}")
+        raise ConfigError(
+            f"{group}={name}: no such option{nearest(str(name), known)}; {group} may be {', '.join(known)}"
+        )
+
+    def _compose_options(self, chosen: tuple[tuple[str, str], ...]) -> dict[str, Any]:
+        """Hydra's tree of these options, unresolved; once for each combination."""
+        if chosen not in self._cache:
+            self._cache[chosen] = self._hydra_compose(dict(chosen))
+        return self._cache[chosen]
+
+    def _hydra_compose(self, chosen: Mapping[str, str]) -> dict[str, Any]:
+        arguments = [f"{group}={name}" for group, name in chosen.items()]
+        if TRIGGER_GROUP in chosen and PRESET_GROUP not in chosen:
+            arguments.append(f"~{PRESET_GROUP}")  # the default preset's name would be wrong
+        tree = self._hydra_tree(arguments)
+        if TRIGGER_GROUP in chosen and PRESET_GROUP in chosen:
+            preset = self._hydra_tree([f"{PRESET_GROUP}={chosen[PRESET_GROUP]}"])
+            wanted = preset["hydra"]["runtime"]["choices"][TRIGGER_GROUP]
+            if wanted != chosen[TRIGGER_GROUP]:
+                raise ConfigError(
+                    f"{PRESET_GROUP}={chosen[PRESET_GROUP]} means {TRIGGER_GROUP}={wanted}, "
+                    f"{TRIGGER_GROUP}={chosen[TRIGGER_GROUP]} contradicts it: give one of the two"
+                )
+        return tree
+
+    def _hydra_tree(self, arguments: list[str]) -> dict[str, Any]:
+        import yaml
+        from hydra import compose, initialize_config_dir
+        from hydra.core.global_hydra import GlobalHydra
+        from hydra.errors import HydraException
+        from omegaconf import OmegaConf
+        from omegaconf.errors import OmegaConfBaseException
+
+        if self.user_folder is not None:
+            arguments = [*arguments, f"hydra.searchpath=[{_file_url(self.user_folder)}]"]
+        GlobalHydra.instance().clear()
+        try:
+            with (
+                warnings.catch_warnings(),
+                initialize_config_dir(config_dir=str(conf_folder()), version_base="1.3", job_name="uavexp"),
+            ):
+                warnings.simplefilter("ignore")
+                composed = compose(CONFIG_NAME, overrides=arguments, return_hydra_config=True)
+            tree: Any = OmegaConf.to_container(composed, resolve=False)
+        except (
+            HydraException,
+            OmegaConfBaseException,
+            yaml.YAMLError,
+            OSError,
+            ValueError,
+            KeyError,
+        ) as error:
+            raise ConfigError(f"the configuration does not compose: {_one_line(error)}") from error
+        return dict(tree)
+
+    def _apply(self, tree: dict[str, Any], setting: Setting) -> None:
+        """Set one value in place; the key must exist unless it is added."""
+        *parents, last = setting.key.split(".")
+        node: Any = tree
+        path: list[str] = []
+        for name in parents:
+            self._require_key(tree, node, path, name, setting)
+            node = node.setdefault(name, {}) if isinstance(node, dict) else None
+            path.append(name)
+        self._require_key(tree, node, path, last, setting)
+        node[last] = setting.values[0]
+
+    def _require_key(
+        self, tree: dict[str, Any], node: Any, path: list[str], name: str, setting: Setting
+    ) -> None:
+        if not isinstance(node, dict):
+            raise ConfigError(f"{setting.key}: {'.'.join(path)} has no parts")
+        if name in node or (setting.add and path):
+            return
+        known = [key for key in node if key not in ("_target_", "hydra")]
+        if not path:
+            raise ConfigError(
+                f"unknown key '{name}'{nearest(name, [*known, PRESET_GROUP])}; "
+                f"known: {', '.join([PRESET_GROUP, *known])}"
+            )
+        owner = ".".join(path)
+        if len(path) == 1 and owner in GROUPS:
+            option = tree["hydra"]["runtime"]["choices"][owner]
+            owner = f"option {option} of {owner}"
+        raise ConfigError(
+            f"{setting.key}: {owner} has no parameter '{name}'{nearest(name, known)}; "
+            f"it has {', '.join(known) or 'none'}"
+        )
+
+
+def _refuse_equal_cells(cells: Sequence[Cell]) -> None:
+    for index, cell in enumerate(cells):
+        for other in cells[:index]:
+            if cell.strategy == other.strategy and cell.config == other.config:
+                typed = " ".join(f"{setting.key}={setting.values[0]}" for setting in cell.settings)
+                raise ConfigError(f"the same configuration twice in one command: {typed}")
+
+
+def _resolve(tree: dict[str, Any]) -> dict[str, Any]:
+    """Resolve `${key}`; refuse `${resolver:...}`, which reads clocks, environment or text as code."""
+    from omegaconf import OmegaConf
+    from omegaconf.errors import OmegaConfBaseException
+
+    hydra = tree["hydra"]
+    own = {key: value for key, value in tree.items() if key != "hydra"}
+    for key, text in _interpolations(own, ""):
+        if _calls_resolver(text):
+            raise ConfigError(f"{key}={text}: only ${{key}} may be used in a value, no ${{resolver:...}}")
+    try:
+        resolved: Any = OmegaConf.to_container(OmegaConf.create(own), resolve=True)
+    except OmegaConfBaseException as error:
+        raise ConfigError(f"the configuration does not resolve: {_one_line(error)}") from error
+    return {**resolved, "hydra": hydra}
+
+
+def _interpolations(node: Any, path: str) -> Iterator[tuple[str, str]]:
+    if isinstance(node, Mapping):
+        for key, value in node.items():
+            yield from _interpolations(value, f"{path}.{key}" if path else str(key))
+    elif isinstance(node, list):
+        for index, value in enumerate(node):
+            yield from _interpolations(value, f"{path}[{index}]")
+    elif isinstance(node, str) and "${" in node:
+        yield path, node
+
+
+def _calls_resolver(text: str) -> bool:
+    from omegaconf.errors import GrammarParseError
+    from omegaconf.grammar_parser import OmegaConfGrammarParser, parse
+
+    def walk(context: Any) -> bool:
+        if isinstance(context, OmegaConfGrammarParser.InterpolationResolverContext):
+            return True
+        return any(walk(child) for child in getattr(context, "children", None) or ())
+
+    try:
+        return walk(parse(text))
+    except GrammarParseError as error:
+        raise ConfigError(f"cannot read the value {text!r}") from error
+
+
+def _file_url(folder: Path) -> str:
+    return quoted(f"file://{folder}")
+
+
+def _one_line(error: BaseException) -> str:
+    text = " ".join(str(error).split())
+    cause = error.__cause__
+    return f"{text or type(error).__name__}" + (f" ({' '.join(str(cause).split())})" if cause else "")

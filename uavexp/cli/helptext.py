@@ -1,0 +1,99 @@
+"""`--help`: what can be typed, read from the yaml files so that it cannot go stale."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+from uavexp.cli.options import PRESET_GROUP, Option, list_options, read_option
+from uavexp.paths import PACKAGE, conf_folder
+
+USAGE = """\
+uavexp flies seeded trials of UAV navigation in unknown indoor spaces.
+
+python -m uavexp [GROUP=OPTION ...] [GROUP.PARAMETER=VALUE ...] [seed=SEEDS] [out=DIR] [flags]
+
+  python -m uavexp strategy=mcr seed=0              one trial: progress, summary, picture
+  python -m uavexp strategy=mcr seed=0:20           twenty trials (the stop is excluded)
+  python -m uavexp -m strategy=mcr,tbr trigger.min_interval_s=0,1    see below: a grid
+  python -m uavexp -m strategy=mcr trigger.delta_map_m=0.05,0.10,0.15 seed=0:20
+  python -m uavexp world=file world.path=office.ply your own building
+  python -m uavexp --help world                     the parameters of one group
+
+seeds     seed=3   seed=1,4,7   seed=0:20   'seed=range(0,20)'   seed=range (the paper's 20)
+grids     a,b,c after any = flies every combination, with or without -m
+lists     world.size_m=[20,12,3] without spaces; quote what your shell or Hydra's grammar would
+          take apart: 'world.path="/data/hall (2).ply"'
+output    trials.parquet and one folder per trial with record.json, log.npz, picture.png, wall.json;
+          in out=DIR or a new folder under outputs/, which is printed last
+exit code 0 all flown, 1 some trial raised, 2 bad input (one line says what), 130 interrupted
+
+flags
+  -h, --help [GROUP]   this text, or one group's parameters
+  -m, --multirun       accepted for Hydra's sake; grids are expanded without it too
+  --cfg job|hydra|all  print the composed configuration and fly nothing
+  --info               print versions and folders and fly nothing
+  --config-dir DIR     your own options, DIR/<group>/<option>.yaml; their classes must be in a package
+                       named in the environment variable UAVEXP_TRUST
+"""
+
+
+def help_text(user_folder: Path | None = None, group: str | None = None) -> str:
+    """The whole help, or the parameters of one group."""
+    options = list_options([conf_folder(), *([user_folder] if user_folder else [])])
+    if group is not None:
+        return _group_text(group, options[group])
+    config = read_option(conf_folder() / "config.yaml")
+    defaults = _defaults(conf_folder() / "config.yaml")
+    lines = [USAGE, "groups and options (* is the default)"]
+    for name, files in _ordered(options).items():
+        words = [f"{'*' if defaults.get(name) == option else ''}{option}" for option in files]
+        lines.append(f"  {name:<11} {'  '.join(words)}")
+    lines += ["", "keys of no group", *_parameter_lines(config, ""), ""]
+    lines += [_group_text(name, files) for name, files in _ordered(options).items() if name != PRESET_GROUP]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def group_names(user_folder: Path | None = None) -> list[str]:
+    """Groups that `--help` can tell about."""
+    return list(list_options([conf_folder(), *([user_folder] if user_folder else [])]))
+
+
+def _ordered(options: dict[str, dict[str, Path]]) -> dict[str, dict[str, Path]]:
+    """The preset first, then in the order of config.yaml, then a user's own groups."""
+    names = [PRESET_GROUP, *_defaults(conf_folder() / "config.yaml"), *options]
+    return {name: options[name] for name in dict.fromkeys(names) if name in options}
+
+
+def _group_text(group: str, files: dict[str, Path]) -> str:
+    lines: list[str] = []
+    for name, file in files.items():
+        option = read_option(file)
+        description = option.description or _docstring(group, name)
+        lines += [f"{group}={name}" + (f"    {description}" if description else "")]
+        lines += [*_parameter_lines(option, f"{group}."), ""]
+    return "\n".join(lines)
+
+
+def _parameter_lines(option: Option, prefix: str) -> list[str]:
+    return [
+        f"  {prefix + parameter.name:<34} {parameter.default:<14} {parameter.comment}".rstrip()
+        for parameter in option.parameters
+    ]
+
+
+def _defaults(file: Path) -> dict[str, str]:
+    """Default option of each group, from the text of config.yaml."""
+    found: dict[str, str] = {}
+    for line in file.read_text(encoding="utf-8").splitlines():
+        words = line.split("#")[0].strip().removeprefix("- ").split(": ")
+        if line.startswith("  - ") and len(words) == 2 and not words[0].startswith("override"):
+            found[words[0]] = words[1].strip()
+    return found
+
+
+def _docstring(group: str, option: str) -> str:
+    """First line of the docstring of the option's module, which is not imported."""
+    file = PACKAGE / group / f"{option}.py"
+    text = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) if file.is_file() else None
+    return text.splitlines()[0] if text else ""

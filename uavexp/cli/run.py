@@ -1,0 +1,132 @@
+"""Flies the trials of a command one after another and writes what they leave behind."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from uavexp.cli.composition import Cell, Command
+from uavexp.cli.flight import Trial, check_world, fly_cell, repeat_command
+from uavexp.cli.outputs import folder_name, laps, output_folder, reason_of, write_failure, write_trial
+from uavexp.cli.rows import failed_row, flown_row
+from uavexp.cli.terminal import Terminal
+from uavexp.errors import ConfigError, RecordError, UavexpError
+from uavexp.records import code_digest, lock_digest
+from uavexp.table import TABLE, write_table
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job:
+    """One trial to fly and where its files go."""
+
+    cell: Cell
+    seed: int
+    folder: str
+    command: str  # that repeats it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Result:
+    """What became of a job."""
+
+    job: Job
+    row: dict[str, Any]
+    trial: Trial | None  # None when it raised
+    reason: str = ""
+
+
+Fly = Callable[[Job], Result]
+
+
+def run_all(jobs: Iterable[Job], fly: Fly) -> Iterator[Result]:
+    """Fly every job, one after another, yielding results as they come."""
+    for job in jobs:
+        yield fly(job)
+
+
+def jobs_of(command: Command, user_folder: Path | None = None) -> list[Job]:
+    """Cells x seeds, sorted by cell and seed."""
+    return [
+        Job(
+            cell=cell,
+            seed=seed,
+            folder=folder_name(cell, seed),
+            command=repeat_command(cell, seed, user_folder),
+        )
+        for cell in command.cells
+        for seed in sorted(command.seeds)
+    ]
+
+
+def execute(command: Command, terminal: Terminal, user_folder: Path | None = None) -> int:
+    """Fly a command's trials and leave an output folder.
+
+    Returns:
+        Exit code: 0, or 1 when some trial raised.
+
+    Raises:
+        UavexpError: bad input, told before anything was written.
+    """
+    jobs = jobs_of(command, user_folder)
+    if len(jobs) > 1:
+        _check_worlds(command)
+    run = {"code": code_digest(), "lock": lock_digest()}
+    results: list[Result] = []
+    with output_folder(command.out, _prefix(command)) as root, terminal.progress(len(jobs)):
+        try:
+            for result in run_all(jobs, lambda job: _fly_job(job, root, run, terminal, bool(results))):
+                results.append(result)
+                terminal.finished(result)
+        finally:  # also when interrupted: what has flown keeps its table
+            if results:
+                write_table(root / TABLE, [result.row for result in results])
+    terminal.summary(results, root)
+    return 0 if all(result.trial is not None for result in results) else 1
+
+
+def _fly_job(job: Job, root: Path, run: dict[str, Any], terminal: Terminal, others_flown: bool) -> Result:
+    """Fly one trial and write its files; a trial that raises costs that trial alone."""
+    begin_s = time.perf_counter()
+    folder = root / job.folder
+    try:
+        trial = fly_cell(job.cell, job.seed, terminal.flying(job))
+    except Exception as error:
+        if isinstance(error, UavexpError) and not others_flown:
+            raise  # bad input, and nothing is written yet
+        wall = {"command": job.command, "wall_trial_s": time.perf_counter() - begin_s}
+        folder.mkdir(exist_ok=True)
+        write_failure(job.cell, job.seed, folder, run, wall, error)
+        row = failed_row(job.cell, job.seed, wall["wall_trial_s"], job.folder)
+        return Result(job=job, row=row, trial=None, reason=reason_of(error))
+    wall = {"command": job.command, "wall_trial_s": time.perf_counter() - begin_s}
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise RecordError(f"{folder}: cannot be made ({error.strerror})") from error
+    write_trial(trial, folder, run, wall)
+    row = flown_row(trial, laps(trial), wall["wall_trial_s"], job.folder)
+    return Result(job=job, row=row, trial=trial, reason=trial.log.reason)
+
+
+def _check_worlds(command: Command) -> None:
+    """Make each distinct world once, so that a bad one is told before the first flight."""
+    seed = min(command.seeds)
+    checked: list[Any] = []
+    for cell in command.cells:
+        if cell.config["world"] not in checked:
+            checked.append(cell.config["world"])
+            try:
+                check_world(cell, seed)
+            except UavexpError:
+                raise
+            except Exception as error:
+                raise ConfigError(f"world={cell.options['world']}: {reason_of(error)}") from error
+
+
+def _prefix(command: Command) -> str:
+    names = dict.fromkeys(cell.strategy for cell in command.cells)
+    worlds = dict.fromkeys(cell.options["world"] for cell in command.cells)
+    return "-".join([*names, *worlds])[:60]

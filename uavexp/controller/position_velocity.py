@@ -1,0 +1,128 @@
+"""Cascaded position-velocity loop with acceleration feed-forward, to thrust and attitude.
+
+    v* = v_ref + clip(k_p (p_ref - p))        a* = a_ref + k_v (v* - v) + (c / m) |v| v
+    f  = a* + g e3, tilted at most `max_tilt_rad`      thrust = m f . z_body
+
+Body z of the wanted attitude points along f, its heading is the reference's yaw; the yaw
+rate of the reference is fed forward. Paper 1 names a position-velocity loop and no more;
+gains and bounds are [ours].
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numba as nb
+import numpy as np
+
+from uavexp.errors import require, require_non_negative, require_positive
+from uavexp.geometry import GRAVITY_MPS2, quaternion_from_rotation
+from uavexp.types import Command, Float, Limits, Reference, State
+
+_LEAST_LIFT = 0.3  # share of gravity that is always lifted, so that body z stays up
+
+
+@nb.njit(cache=True)
+def _attitude(force: Float, yaw_rad: float) -> Float:
+    """Quaternion (4,) with body z along `force` (3,), upward, and heading `yaw_rad`."""
+    z = force / math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
+    heading = np.array([math.cos(yaw_rad), math.sin(yaw_rad), 0.0])
+    y = np.cross(z, heading)
+    y /= math.sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])
+    x = np.cross(y, z)
+    rotation = np.empty((3, 3))
+    rotation[:, 0], rotation[:, 1], rotation[:, 2] = x, y, z
+    return quaternion_from_rotation(rotation)
+
+
+@nb.njit(cache=True)
+def _clip_norm(vector: Float, limit: float) -> None:
+    """Shorten a vector (3,) in place to the length `limit`."""
+    norm = math.sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])
+    if norm > limit:
+        vector *= limit / norm
+
+
+@nb.njit(cache=True)
+def _command(
+    position_m: Float,
+    velocity_mps: Float,
+    q: Float,
+    reference_position_m: Float,
+    reference_velocity_mps: Float,
+    reference_acceleration_mps2: Float,
+    yaw_rad: float,
+    position_gain: float,
+    velocity_gain: float,
+    max_correction_mps: float,
+    max_tilt_rad: float,
+    drag_per_m: float,
+) -> tuple[float, Float]:
+    """Specific thrust along body z, m/s², and wanted attitude (4,); see the module's equations."""
+    correction = position_gain * (reference_position_m - position_m)
+    _clip_norm(correction, max_correction_mps)
+    force = reference_acceleration_mps2 + velocity_gain * (reference_velocity_mps + correction - velocity_mps)
+    speed = math.sqrt(velocity_mps[0] ** 2 + velocity_mps[1] ** 2 + velocity_mps[2] ** 2)
+    force += drag_per_m * speed * velocity_mps
+    force[2] = max(force[2] + GRAVITY_MPS2, _LEAST_LIFT * GRAVITY_MPS2)
+    sideways = math.sqrt(force[0] * force[0] + force[1] * force[1])
+    most = force[2] * math.tan(max_tilt_rad)
+    if sideways > most:
+        force[0] *= most / sideways
+        force[1] *= most / sideways
+    body_z_x, body_z_y = 2.0 * (q[1] * q[3] + q[0] * q[2]), 2.0 * (q[2] * q[3] - q[0] * q[1])
+    body_z_z = 1.0 - 2.0 * (q[1] * q[1] + q[2] * q[2])
+    thrust = force[0] * body_z_x + force[1] * body_z_y + force[2] * body_z_z
+    return max(thrust, 0.0), _attitude(force, yaw_rad)
+
+
+@dataclass(slots=True, kw_only=True)
+class PositionVelocity:
+    """Cascaded position-velocity loop with acceleration feed-forward."""
+
+    rate_hz: float = 100.0
+    position_gain_per_s: float = 2.0
+    velocity_gain_per_s: float = 5.0
+    max_correction_mps: float = 1.0
+    max_tilt_rad: float = 0.6
+    drag_kgpm: float = 0.0
+    _mass_kg: float = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check every parameter."""
+        require_positive(
+            rate_hz=self.rate_hz,
+            position_gain_per_s=self.position_gain_per_s,
+            velocity_gain_per_s=self.velocity_gain_per_s,
+            max_correction_mps=self.max_correction_mps,
+            max_tilt_rad=self.max_tilt_rad,
+        )
+        require_non_negative(drag_kgpm=self.drag_kgpm)
+        require(self.max_tilt_rad <= 1.2, f"max_tilt_rad must be <= 1.2 rad, got {self.max_tilt_rad}")
+
+    def reset(self, limits: Limits, mass_kg: float) -> None:
+        """Begin a trial of a vehicle of this mass."""
+        self._mass_kg = mass_kg
+
+    def command(self, estimated_state: State, reference: Reference) -> Command:
+        """Return thrust and attitude that lead the state to the reference."""
+        thrust, attitude = _command(
+            estimated_state.position_m,
+            estimated_state.velocity_mps,
+            estimated_state.quaternion_wxyz,
+            reference.position_m,
+            reference.velocity_mps,
+            reference.acceleration_mps2,
+            float(reference.yaw_rad),
+            float(self.position_gain_per_s),
+            float(self.velocity_gain_per_s),
+            float(self.max_correction_mps),
+            float(self.max_tilt_rad),
+            self.drag_kgpm / self._mass_kg,
+        )
+        return Command(
+            thrust_N=self._mass_kg * thrust,
+            quaternion_wxyz=attitude,
+            body_rate_radps=np.array([0.0, 0.0, reference.yaw_rate_radps]),
+        )

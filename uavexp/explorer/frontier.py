@@ -1,0 +1,283 @@
+"""Frontier exploration with the paper's scoring and a target term (paper 1, §3.3).
+
+Frontier F = free cells of the planar map with an unknown 8-neighbour. Each cluster of F
+gives one candidate: its centroid, moved up the distance field until the clearance is
+enough. A candidate g is kept when d(g) > d_min and a path over known-free cells leads
+there, and is scored
+
+    S(g) = alpha J_info(g) - beta J_cost(g) - gamma J_target(g)
+
+J_info = unknown cells within `neighbourhood_m` of g; J_cost = length of the path to g, m;
+J_target = length of the optimistic path (unknown is free) from g to the target, m. The
+paper's score is gamma = 0; with beta = gamma the route through g that promises to be
+shortest wins, information breaking ties. When the target itself is reachable over
+known-free cells, the goal is the target.
+
+Left to us by the paper, and [ours] here: splitting long clusters (the centroid of a long
+curved frontier lies off it), setting visited or rejected goals aside, and persistence: a
+goal is kept until it is nearer than `commit_m`, no longer reachable, or beaten by more
+than `hysteresis`. Without it g* recedes with every scan, and "goal drift" means nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+from uavexp.mapping.projection import PlanarMap, project
+
+from uavexp.errors import require, require_non_negative, require_option, require_positive
+from uavexp.explorer.planar import (
+    FREE,
+    UNKNOWN,
+    connected_components,
+    density_clusters,
+    descend,
+    frontier_cells,
+    path_lengths,
+    split_long,
+    unknown_within,
+)
+from uavexp.mapping.base import DistanceField
+from uavexp.types import Bool, Float, Float32, Goal, Limits, Observation
+
+
+class Clustering(StrEnum):
+    """How frontier cells are grouped."""
+
+    COMPONENTS = "components"
+    DBSCAN = "dbscan"
+
+
+@dataclass(frozen=True, slots=True)
+class _Search:
+    """Graph distances on one planar map, from the vehicle and from the target."""
+
+    planar: PlanarMap
+    inside: Bool  # (X, Y) cells within the flight bounds
+    from_vehicle: Float32  # (X, Y) over known-free cells, in cells
+    from_target: Float32 | None  # (X, Y) with unknown as free, in cells
+    target_cell: tuple[int, int] | None
+
+    def cost_m(self, cell: tuple[int, int]) -> float:
+        return float(self.from_vehicle[cell]) * self.planar.cell_m
+
+    def to_target_m(self, cell: tuple[int, int]) -> float:
+        return 0.0 if self.from_target is None else float(self.from_target[cell]) * self.planar.cell_m
+
+
+@dataclass(slots=True, kw_only=True)
+class Frontier:
+    """Frontier goals; see the module docstring for the score."""
+
+    rate_hz: float = 5.0
+    alpha: float = 0.005  # m per unknown cell
+    beta: float = 1.0
+    gamma: float = 1.0
+    neighbourhood_m: float = 1.0
+    clustering: Clustering = Clustering.COMPONENTS
+    min_cluster_cells: int = 5
+    max_cluster_m: float = 3.0
+    dbscan_radius_m: float = 0.3
+    dbscan_min_neighbours: int = 3
+    ascent_step_m: float = 0.1  # alpha_g
+    ascent_steps: int = 20
+    min_clearance_m: float = 0.3  # d_min
+    enough_clearance_m: float = 0.6
+    cell_m: float = 0.15
+    band_below_m: float = 0.2
+    band_above_m: float = 0.2
+    min_distance_m: float = 0.8
+    commit_m: float = 1.5
+    hysteresis: float = 2.0
+    visited_m: float = 0.5
+    set_aside_s: float = 10.0
+    _height_m: float = field(init=False, repr=False, default=0.0)
+    _current: Goal | None = field(init=False, repr=False, default=None)
+    _aside: list[tuple[float, Float]] = field(init=False, repr=False, default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.clustering = require_option("clustering", self.clustering, Clustering)
+        require_positive(
+            rate_hz=self.rate_hz,
+            neighbourhood_m=self.neighbourhood_m,
+            max_cluster_m=self.max_cluster_m,
+            dbscan_radius_m=self.dbscan_radius_m,
+            ascent_step_m=self.ascent_step_m,
+            min_clearance_m=self.min_clearance_m,
+            cell_m=self.cell_m,
+            visited_m=self.visited_m,
+        )
+        require_non_negative(
+            alpha=self.alpha,
+            beta=self.beta,
+            gamma=self.gamma,
+            band_below_m=self.band_below_m,
+            band_above_m=self.band_above_m,
+            min_distance_m=self.min_distance_m,
+            commit_m=self.commit_m,
+            hysteresis=self.hysteresis,
+            set_aside_s=self.set_aside_s,
+            ascent_steps=self.ascent_steps,
+        )
+        require(self.min_cluster_cells >= 1, f"min_cluster_cells must be >= 1, got {self.min_cluster_cells}")
+        require(
+            self.enough_clearance_m >= self.min_clearance_m,
+            f"enough_clearance_m must be >= min_clearance_m = {self.min_clearance_m},"
+            f" got {self.enough_clearance_m}",
+        )
+
+    def reset(self, flight_height_m: float, limits: Limits) -> None:
+        """Begin a trial at this flight height."""
+        self._height_m = flight_height_m
+        self._current = None
+        self._aside = []
+
+    def reject(self, position_m: Float, time_s: float) -> None:
+        """Set goals around this position aside for `set_aside_s`."""
+        self._aside.append((time_s + self.set_aside_s, position_m))
+        self._current = None
+
+    def select(self, observation: Observation) -> Goal | None:
+        """Return g*, or None when neither the target nor any frontier is reachable."""
+        position_m, now_s = observation.state.position_m, observation.time_s
+        self._aside = [entry for entry in self._aside if entry[0] > now_s]
+        search = self._search(observation)
+        if self._target_reachable(search, observation):
+            self._current = _target_goal(observation)
+            return self._current
+        current = self._current
+        if current is not None and not current.is_target:
+            distance_m = float(np.linalg.norm(current.position_m - position_m))
+            if distance_m < self.visited_m:
+                self._aside.append((now_s + self.set_aside_s, current.position_m))
+        best = self._best_candidate(search, observation)
+        if current is not None and not current.is_target and not self._is_aside(current.position_m):
+            distance_m = float(np.linalg.norm(current.position_m - position_m))
+            kept = self._score(search, current.position_m, observation.field)
+            # Information is left out of `kept`: what that goal promised is being seen on the way.
+            beaten = best is not None and kept is not None and best.score >= kept.score + self.hysteresis
+            if kept is not None and distance_m > self.commit_m and not beaten:
+                return current
+        self._current = best
+        return best
+
+    def _search(self, observation: Observation) -> _Search:
+        planar = project(
+            observation.field,
+            z_min_m=self._height_m - self.band_below_m,
+            z_max_m=self._height_m + self.band_above_m,
+            flight_height_m=self._height_m,
+            cell_m=self.cell_m,
+            occupied_below_m=self.min_clearance_m,
+        )
+        inside = _inside(planar, observation.flight_bounds_m)
+        clear = inside & (planar.clearance > self.min_clearance_m)
+        unit = np.ones(planar.state.shape, dtype=np.float32)
+        vehicle = planar.cell_of(observation.state.position_m)
+        from_vehicle = path_lengths(clear & (planar.state == FREE), unit, vehicle)
+        if observation.target_m is None:
+            return _Search(planar, inside, from_vehicle, None, None)
+        target = planar.cell_of(observation.target_m)
+        from_target = path_lengths(clear | (inside & (planar.state == UNKNOWN)), unit, target)
+        return _Search(planar, inside, from_vehicle, from_target, target)
+
+    def _target_reachable(self, search: _Search, observation: Observation) -> bool:
+        if search.target_cell is None or observation.target_m is None:
+            return False
+        return bool(np.isfinite(search.from_vehicle[search.target_cell])) and not self._is_aside(
+            observation.target_m
+        )
+
+    def _best_candidate(self, search: _Search, observation: Observation) -> Goal | None:
+        candidates = [
+            goal
+            for cluster in self._clusters(search)
+            if (goal := self._candidate(search, cluster, observation)) is not None
+        ]
+        return max(candidates, key=lambda goal: goal.score, default=None)
+
+    def _clusters(self, search: _Search) -> list[np.ndarray]:
+        cells = frontier_cells(search.planar.state, search.inside)
+        if self.clustering is Clustering.DBSCAN:
+            clusters = density_clusters(cells, self.dbscan_radius_m / self.cell_m, self.dbscan_min_neighbours)
+        else:
+            clusters = connected_components(cells)
+        limit = self.max_cluster_m / self.cell_m
+        return [
+            part
+            for cluster in clusters
+            if len(cluster) >= self.min_cluster_cells
+            for part in split_long(cluster, limit)
+        ]
+
+    def _candidate(self, search: _Search, cluster: np.ndarray, observation: Observation) -> Goal | None:
+        centroid = search.planar.centre_m(cluster.mean(axis=0))
+        point = np.append(centroid, self._height_m)
+        point = self._ascend(point, observation.field, observation.flight_bounds_m)
+        if np.linalg.norm(point - observation.state.position_m) < self.min_distance_m:
+            return None
+        return None if self._is_aside(point) else self._score(search, point, observation.field, info=True)
+
+    def _ascend(self, point_m: Float, distance: DistanceField, bounds_m: Float) -> Float:
+        """X <- x + alpha_g grad ESDF(x) in the plane until the clearance is enough."""
+        for _ in range(self.ascent_steps):
+            if distance.distance_m(point_m[None])[0] >= self.enough_clearance_m:
+                break
+            gradient = distance.gradient(point_m[None])[0]
+            norm = math.hypot(gradient[0], gradient[1])
+            if norm < 1e-3:
+                break
+            moved = point_m.copy()
+            moved[:2] += self.ascent_step_m * gradient[:2] / norm
+            point_m = np.clip(moved, bounds_m[0], bounds_m[1])
+        point_m[2] = self._height_m
+        return point_m
+
+    def _score(
+        self, search: _Search, point_m: Float, distance: DistanceField, info: bool = False
+    ) -> Goal | None:
+        """Score one goal, None when it is too close to an obstacle or not reachable."""
+        cell = search.planar.cell_of(point_m)
+        cost_m, to_target_m = search.cost_m(cell), search.to_target_m(cell)
+        if not (math.isfinite(cost_m) and math.isfinite(to_target_m)):
+            return None
+        if distance.distance_m(point_m[None])[0] <= self.min_clearance_m:
+            return None
+        score = -self.beta * cost_m - self.gamma * to_target_m
+        if info:
+            radius = self.neighbourhood_m / self.cell_m
+            score += self.alpha * unknown_within(search.planar.state, search.inside, cell, radius)
+        return Goal(
+            position_m=point_m,
+            is_target=False,
+            score=score,
+            heading_rad=_arrival_heading(search.from_vehicle, cell),
+        )
+
+    def _is_aside(self, point_m: Float) -> bool:
+        return any(float(np.linalg.norm(point_m - other)) < self.visited_m for _, other in self._aside)
+
+
+def _target_goal(observation: Observation) -> Goal:
+    assert observation.target_m is not None
+    return Goal(position_m=observation.target_m, is_target=True, score=0.0)
+
+
+def _inside(planar: PlanarMap, bounds_m: Float) -> Bool:
+    nx, ny = planar.state.shape
+    x = planar.origin_m[0] + (np.arange(nx) + 0.5) * planar.cell_m
+    y = planar.origin_m[1] + (np.arange(ny) + 0.5) * planar.cell_m
+    within_x = (x >= bounds_m[0, 0]) & (x <= bounds_m[1, 0])
+    within_y = (y >= bounds_m[0, 1]) & (y <= bounds_m[1, 1])
+    inside: Bool = within_x[:, None] & within_y[None, :]
+    return inside
+
+
+def _arrival_heading(from_vehicle: Float32, cell: tuple[int, int]) -> float:
+    """Direction of the last half dozen cells of the path to `cell`, rad."""
+    path = descend(from_vehicle, cell)
+    back = path[min(6, len(path) - 1)]
+    return math.atan2(cell[1] - float(back[1]), cell[0] - float(back[0]))

@@ -1,0 +1,235 @@
+"""From truncated signed distances to unknown, free and occupied, and from there to the ESDF.
+
+Every observation of a voxel is a signed distance d along the optical axis from the voxel
+to the measured surface, positive in front of it, cut off at the truncation. It is fused,
+D <- (w D + d) / (w + 1) with capped w (Curless and Levoy 1996), and judged:
+
+- The judged value is the fused D while d agrees with it, so that the sensor's noise is
+  averaged out, and d itself where the two contradict each other, so that what appears or
+  disappears is not held back by a long history.
+- Below `occupied_below_m` it is a hit, above `free_above_m` a miss, in between neither. Hits
+  and misses move a small clamped counter (as the clamped log-odds of Hornung et al. 2013);
+  a voxel becomes occupied when the counter reaches `occupied_evidence` and ceases to be
+  when it is back at zero. One hit is not enough, so a speckle makes no obstacle; a voxel hit
+  once is not called free either, so no first sight of a surface is lost. A hit counts more
+  than a miss: an object narrower than a pixel, hit in a third of the frames, stands.
+- The two limits lie 3/4 of a voxel apart and their sum exceeds a voxel. So a board thinner
+  than a voxel, even a sheet, keeps an occupied voxel from either side: if its nearest voxel
+  lies s behind the front, then s in front of the back, and min(s, voxel - s) is below half a
+  voxel. This holds up to about 60 degrees between the surface's normal and the optical axis,
+  beyond which distances along the axis exceed twice the true ones.
+- What lies more than `free_above_m` behind a surface is only inferred to be solid: it does not
+  overwrite a voxel that was measured to be free. Without this, a thin wall seen from behind
+  fills the room in front of it. Further behind than the truncation nothing is touched, and
+  stays unknown.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numba as nb
+import numpy as np
+
+from uavexp.errors import WorldError, require
+from uavexp.mapping.base import DistanceField
+from uavexp.mapping.esdf import SignedDistance
+from uavexp.types import Float, Float32, Int32, MapUpdate, UInt8
+
+_UNKNOWN, _FREE, _OCCUPIED = 0, 1, 2  # of `mapping.base`; literals so that kernels compile them in
+# bits of a live voxel's byte: 0-1 state, 2 on the list of changes, 3-7 evidence
+_STATE, _LISTED, _EVIDENCE = 3, 4, 3
+LARGEST_EVIDENCE = 31
+_BYTES_PER_VOXEL = 45  # TSDF 7, ESDF stages and scratch 38
+
+
+class Rule(NamedTuple):
+    """The fusion and occupancy rule in the form that kernels take; see the module's text."""
+
+    truncation_m: float
+    max_weight: int
+    occupied_below_m: float
+    free_above_m: float
+    hit_evidence: int
+    miss_evidence: int
+    occupied_evidence: int
+    max_evidence: int
+
+
+@nb.njit(cache=True, inline="always")
+def keeps_free(observed_m: float, fused_m: float, weight: int, byte: int, rule: Rule) -> bool:
+    """Whether an observation from behind a surface must not touch a voxel measured to be free."""
+    return (
+        observed_m < -rule.free_above_m
+        and fused_m > rule.free_above_m
+        and weight >= 2
+        and (byte >> _EVIDENCE) == 0
+    )
+
+
+@nb.njit(cache=True, inline="always")
+def judge(
+    observed_m: float, fused_before_m: float, weight_before: int, fused_m: float, byte: int, rule: Rule
+) -> int:
+    """Return a voxel's byte after one observation: evidence and state moved, list bit kept."""
+    agrees = weight_before == 0 or abs(observed_m - fused_before_m) <= rule.free_above_m
+    judged = fused_m if agrees else observed_m
+    evidence = byte >> _EVIDENCE
+    state = byte & _STATE
+    if judged < rule.occupied_below_m:
+        evidence = min(evidence + rule.hit_evidence, rule.max_evidence)
+    elif judged > rule.free_above_m:
+        evidence = max(evidence - rule.miss_evidence, 0)
+    if evidence >= rule.occupied_evidence:
+        state = _OCCUPIED
+    elif evidence == 0:
+        state = _FREE
+    return (evidence << _EVIDENCE) | (byte & _LISTED) | state
+
+
+@nb.njit(cache=True, inline="always")
+def enlist(at: int, byte: int, live: UInt8, state: UInt8, changes: Int32, count: int) -> int:
+    """Store a voxel's byte; list the voxel if its state left the published one. Returns the new count."""
+    if (byte & _LISTED) == 0 and (byte & _STATE) != state[at]:
+        byte |= _LISTED
+        changes[count] = at
+        count += 1
+    live[at] = byte
+    return count
+
+
+@nb.njit(cache=True)
+def _mark_ball(
+    centre: Float, radius: float, shape: tuple[int, int, int], live: UInt8, state: UInt8,
+    changes: Int32, count: int,
+) -> int:  # fmt: skip
+    """Make unknown voxels free whose centres lie within `radius` of `centre` (voxel units)."""
+    nx, ny, nz = shape
+    for x in range(max(int(centre[0] - radius), 0), min(int(centre[0] + radius) + 1, nx)):
+        for y in range(max(int(centre[1] - radius), 0), min(int(centre[1] + radius) + 1, ny)):
+            for z in range(max(int(centre[2] - radius), 0), min(int(centre[2] + radius) + 1, nz)):
+                dx, dy, dz = x + 0.5 - centre[0], y + 0.5 - centre[1], z + 0.5 - centre[2]
+                at = (x * ny + y) * nz + z
+                if dx * dx + dy * dy + dz * dz <= radius * radius and (live[at] & _STATE) == _UNKNOWN:
+                    count = enlist(at, live[at] | _FREE, live, state, changes, count)
+    return count
+
+
+@nb.njit(cache=True)
+def _publish(
+    live: UInt8, state: UInt8, changes: Int32, count: int, flipped: Int32, first_seen: Int32
+) -> tuple[int, int]:
+    """Carry listed changes from `live` to `state`; list voxels that flipped and that were first seen."""
+    flips, firsts = 0, 0
+    for n in range(count):
+        at = changes[n]
+        live[at] &= ~_LISTED & 255
+        before, after = state[at], live[at] & _STATE
+        if before == after:
+            continue
+        if before == _UNKNOWN:
+            first_seen[firsts] = at
+            firsts += 1
+        if (before == _OCCUPIED) != (after == _OCCUPIED):
+            flipped[flips] = at
+            flips += 1
+        state[at] = after
+    return flips, firsts
+
+
+def grid_shape(
+    bounds_m: Float, voxel_size_m: float, max_memory_mb: float, bytes_per_voxel: int = _BYTES_PER_VOXEL
+) -> tuple[int, int, int]:
+    """Voxels along each axis that cover `bounds_m`.
+
+    Args:
+        bounds_m: (2, 3) lower and upper corner.
+        voxel_size_m: edge of a voxel, m.
+        max_memory_mb: refuse grids that need more, 10^6 bytes.
+        bytes_per_voxel: of everything kept for a voxel.
+
+    Raises:
+        WorldError: the bounds are not a box, or the grid would need too much memory.
+    """
+    size = np.asarray(bounds_m, dtype=np.float64)
+    if size.shape != (2, 3) or not np.isfinite(size).all() or np.any(size[1] <= size[0]):
+        raise WorldError(f"bounds_m must be a finite box (2, 3), lower < upper, got {np.asarray(bounds_m)}")
+    count = np.ceil((size[1] - size[0]) / voxel_size_m - 1e-6).clip(1)
+    need_mb = float(np.prod(count)) * bytes_per_voxel / 1e6
+    if need_mb > max_memory_mb or float(np.prod(count)) > 2**31 - 1:
+        extent = " x ".join(f"{edge:.6g}" for edge in size[1] - size[0])
+        raise WorldError(
+            f"a map of {extent} m at voxel_size_m {voxel_size_m} needs {need_mb:,.0f} MB, "
+            f"allowed are {max_memory_mb:,.0f} MB (mapping.max_memory_mb)"
+        )
+    return int(count[0]), int(count[1]), int(count[2])
+
+
+def check_rule(rule: Rule) -> None:
+    """Raise `ConfigError` unless the rule is consistent."""
+    require(
+        -rule.truncation_m < rule.occupied_below_m < rule.free_above_m < rule.truncation_m,
+        "-truncation_m < occupied_below_m < free_above_m < truncation_m must hold, got "
+        f"truncation_m {rule.truncation_m}, occupied_below_m {rule.occupied_below_m}, "
+        f"free_above_m {rule.free_above_m}",
+    )
+    require(1 <= rule.max_weight <= 255, f"max_weight must be in 1..255, got {rule.max_weight}")
+    require(
+        1 <= rule.occupied_evidence <= rule.max_evidence <= LARGEST_EVIDENCE,
+        f"1 <= occupied_evidence <= max_evidence <= {LARGEST_EVIDENCE} must hold, got "
+        f"{rule.occupied_evidence} and {rule.max_evidence}",
+    )
+    require(
+        rule.hit_evidence >= 1 and rule.miss_evidence >= 1,
+        f"hit_evidence and miss_evidence must be >= 1, got {rule.hit_evidence} and {rule.miss_evidence}",
+    )
+
+
+class OccupancyMap:
+    """TSDF, occupancy and ESDF of one trial on a dense grid; kernels of the backends write the arrays.
+
+    `live` runs ahead with every scan; `state` and the field change at `publish` only.
+    """
+
+    def __init__(
+        self, bounds_m: Float, voxel_size_m: float, max_distance_m: float, max_memory_mb: float
+    ) -> None:
+        """Begin with everything unknown; see `grid_shape` for what is refused."""
+        self.shape = grid_shape(bounds_m, voxel_size_m, max_memory_mb)
+        size = self.shape[0] * self.shape[1] * self.shape[2]
+        self.origin_m: Float = np.array(bounds_m[0], dtype=np.float64)
+        self.voxel_size_m = voxel_size_m
+        self.tsdf_m: Float32 = np.zeros(size, np.float32)
+        self.weight: UInt8 = np.zeros(size, np.uint8)
+        self.live: UInt8 = np.zeros(size, np.uint8)
+        self.state: UInt8 = np.zeros(size, np.uint8)
+        self.changes: Int32 = np.empty(size, np.int32)
+        self.changed = 0  # how many of `changes` are in use
+        self._flipped: Int32 = np.empty(size, np.int32)
+        self._first_seen: Int32 = np.empty(size, np.int32)
+        self._esdf = SignedDistance(self.shape, voxel_size_m, max_distance_m)
+        self.field = DistanceField(
+            origin_m=self.origin_m,
+            voxel_size_m=voxel_size_m,
+            max_distance_m=max_distance_m,
+            distance=self._esdf.distance,
+            state=self.state.reshape(self.shape),
+        )
+
+    def mark_free(self, centre_m: Float, radius_m: float) -> None:
+        """Make what is still unknown in a ball free; measurements override it like any other."""
+        centre = (np.asarray(centre_m, dtype=np.float64) - self.origin_m) / self.voxel_size_m
+        self.changed = _mark_ball(
+            centre, radius_m / self.voxel_size_m, self.shape, self.live, self.state, self.changes,
+            self.changed,
+        )  # fmt: skip
+
+    def publish(self, time_s: float) -> MapUpdate:
+        """Bring state and field up to what was integrated; return what changed since last time."""
+        flips, firsts = _publish(
+            self.live, self.state, self.changes, self.changed, self._flipped, self._first_seen
+        )
+        self.changed = 0
+        return self._esdf.update(
+            time_s, self.field.state, self._flipped[:flips], self._first_seen[:firsts]
+        )

@@ -1,0 +1,275 @@
+"""The pilot: owns the flown trajectory, turns decisions into plans, holds and brakes.
+
+A request made at t is planned from the predicted reference at t + latency on the map at t
+and takes effect at t + latency; until then the vehicle follows the old trajectory. One
+request is in flight at a time, further triggers meanwhile are dropped and counted. When
+no plan is found: the goal is set aside, the next goals are tried, then the vehicle brakes
+within its stopping distance, holds, and tries again at the explorer's rate.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from uavexp.explorer.base import Explorer
+from uavexp.geometry import evaluate, sample_times, wrap_angle
+from uavexp.planner.base import Planner
+from uavexp.planner.brake import braking_trajectory
+from uavexp.recorder import Stopwatch
+from uavexp.safety.base import Safety
+from uavexp.trigger.base import TriggerPolicy
+from uavexp.types import (
+    Float,
+    Float32,
+    Goal,
+    Limits,
+    Observation,
+    PlanRequest,
+    PlanResult,
+    PlanStatus,
+    Reference,
+    Replan,
+    Trajectory,
+)
+
+_GOALS_PER_REQUEST = 3  # so many goals are tried before the vehicle brakes [ours]
+_SAMPLE_S = 0.1  # spacing of the samples kept of a trajectory
+
+
+@dataclass(frozen=True, slots=True)
+class _Pending:
+    """A plan waiting for its latency to pass."""
+
+    trajectory: Trajectory
+    goal: Goal
+
+
+@dataclass(slots=True, kw_only=True)
+class Pilot:
+    """What is flown, and every planning request made on the way."""
+
+    explorer: Explorer
+    trigger: TriggerPolicy
+    planner: Planner
+    safety: Safety
+    limits: Limits
+    watch: Stopwatch
+    latency_s: float
+    restart_error_m: float
+    yaw_lookahead_s: float
+    yaw_rate_radps: float  # kept below the body-rate limit: roll and pitch need their share
+    flight_bounds_m: Float  # (2, 3)
+    hover_m: Float  # (3,) held until the first plan takes effect
+    yaw_rad: float
+    trajectory: Trajectory | None = None
+    goal: Goal | None = None
+    best_goal: Goal | None = None
+    replans: list[Replan] = field(default_factory=list)
+    dropped_triggers: int = 0
+    failure: str = ""  # reason of the last failed request, "" after a success
+    _pending: _Pending | None = None
+    _wait_for_rest: bool = False  # after the safety's brake: no new plan before standstill
+
+    @property
+    def ever_planned(self) -> bool:
+        """Whether any plan was found."""
+        return any(replan.status is PlanStatus.OK for replan in self.replans)
+
+    def reference(self, time_s: float, step_s: float) -> Reference:
+        """What to follow now; adopts a plan whose time has come and turns the yaw."""
+        if self._pending is not None and time_s >= self._pending.trajectory.start_s - 1e-9:
+            self.trajectory, self.goal, self._pending = self._pending.trajectory, self._pending.goal, None
+        if self.trajectory is None:
+            zero = np.zeros(3)
+            return Reference(
+                position_m=self.hover_m, velocity_mps=zero, acceleration_mps2=zero, yaw_rad=self.yaw_rad
+            )
+        ahead_s = min(time_s + self.yaw_lookahead_s, max(time_s, self.trajectory.end_s))
+        position, velocity, acceleration = evaluate(self.trajectory, np.array([time_s, ahead_s]))
+        rate_radps = self._turn(position[1] - position[0], step_s)
+        return Reference(
+            position_m=position[0],
+            velocity_mps=velocity[0],
+            acceleration_mps2=acceleration[0],
+            yaw_rad=self.yaw_rad,
+            yaw_rate_radps=rate_radps,
+        )
+
+    def _turn(self, ahead_m: Float, step_s: float) -> float:
+        """Turn the yaw towards the path ahead; return the rate, rad/s."""
+        if math.hypot(ahead_m[0], ahead_m[1]) < 0.1:
+            return 0.0
+        error_rad = wrap_angle(math.atan2(ahead_m[1], ahead_m[0]) - self.yaw_rad)
+        rate_radps = min(max(4.0 * error_rad, -self.yaw_rate_radps), self.yaw_rate_radps)
+        self.yaw_rad = wrap_angle(self.yaw_rad + rate_radps * step_s)
+        return rate_radps
+
+    def explore(self, observation: Observation) -> None:
+        """Update g*; while without a valid plan, try again."""
+        self._select(observation)
+        if self.trajectory is None and not self.replans:
+            self.request("first", replace(observation, best_goal=self.best_goal))
+        elif self.failure and not (self._wait_for_rest and self._moving(observation.time_s)):
+            self.request("retry", replace(observation, best_goal=self.best_goal))
+
+    def decide(self, observation: Observation) -> float:
+        """Ask safety and trigger; return the trigger's score."""
+        if not self.failure and self.safety.must_brake(observation):
+            self._brake(observation.time_s, "braked before an obstacle or unknown space")
+            self._wait_for_rest = True
+        with self.watch.lap("trigger"):
+            decision = self.trigger.decide(observation)
+        if decision.replan and self.trajectory is not None and not self._wait_for_rest:
+            changed_m = observation.field.voxel_centres_m(decision.voxel).astype(np.float32)
+            self.request(decision.cause, observation, decision.score, changed_m)
+        return decision.score
+
+    def request(
+        self, cause: str, observation: Observation, score: float = 0.0, changed_m: Float32 | None = None
+    ) -> None:
+        """Plan to g* (or the next best goals); brake when there is no plan."""
+        if self._pending is not None:
+            self.dropped_triggers += 1
+            return
+        goal = observation.best_goal
+        for _ in range(_GOALS_PER_REQUEST):
+            if goal is None:
+                break
+            result = self._plan(observation, goal)
+            self._note(cause, score, observation, goal, result, changed_m)
+            if result.trajectory is not None:
+                self._accept(result.trajectory, goal, observation)
+                return
+            self.failure = f"{result.status.value}: {result.reason}"
+            self.explorer.reject(goal.position_m, observation.time_s)
+            goal = self._select(observation)
+        if goal is None:
+            self.failure = self.failure or "no goal is reachable"
+        self._brake(observation.time_s, self.failure)
+
+    def _select(self, observation: Observation) -> Goal | None:
+        with self.watch.lap("explore"):
+            self.best_goal = self.explorer.select(observation)
+        return self.best_goal
+
+    def _plan(self, observation: Observation, goal: Goal) -> PlanResult:
+        result = self.planner.plan(self._plan_request(observation, goal))
+        self.watch.add("search", result.wall_search_s)
+        self.watch.add("optimise", result.wall_optimise_s)
+        return result
+
+    def _plan_request(self, observation: Observation, goal: Goal) -> PlanRequest:
+        """From the reference at t + latency; from the measured state when that has been left behind."""
+        start_s = observation.time_s + self.latency_s
+        state = observation.state
+        position_m, velocity_mps, acceleration_mps2 = self._planned_state(start_s)
+        error_m = float(np.linalg.norm(observation.reference.position_m - state.position_m))
+        if error_m >= self.restart_error_m:
+            position_m = state.position_m + self.latency_s * state.velocity_mps
+            velocity_mps, acceleration_mps2 = state.velocity_mps, np.zeros(3)
+        return PlanRequest(
+            time_s=start_s,
+            position_m=position_m,
+            velocity_mps=velocity_mps,
+            acceleration_mps2=acceleration_mps2,
+            goal=goal,
+            field=observation.field,
+            flight_bounds_m=self.flight_bounds_m,
+        )
+
+    def _planned_state(self, time_s: float) -> tuple[Float, Float, Float]:
+        if self.trajectory is None:
+            return self.hover_m, np.zeros(3), np.zeros(3)
+        position, velocity, acceleration = evaluate(self.trajectory, np.array([time_s]))
+        return position[0], velocity[0], acceleration[0]
+
+    def _accept(self, trajectory: Trajectory, goal: Goal, observation: Observation) -> None:
+        flown = with_stop(trajectory, self.limits)
+        self._pending = _Pending(flown, goal)
+        self.failure, self._wait_for_rest = "", False
+        self.trigger.planned(flown, observation.field)
+
+    def _note(
+        self,
+        cause: str,
+        score: float,
+        observation: Observation,
+        goal: Goal,
+        result: PlanResult,
+        changed_m: Float32 | None,
+    ) -> None:
+        new_m = np.zeros((0, 3))
+        change_m, effective_s = math.nan, math.nan
+        if result.trajectory is not None:
+            effective_s = result.trajectory.start_s
+            new_m = _samples(result.trajectory, effective_s)
+            if self.trajectory is not None:
+                change_m = _path_change_m(_samples(self.trajectory, effective_s), new_m)
+        self.replans.append(
+            Replan(
+                time_s=observation.time_s,
+                effective_s=effective_s,
+                cause=cause,
+                score=score,
+                position_m=observation.state.position_m,
+                goal_m=goal.position_m,
+                status=result.status,
+                reason=result.reason,
+                path_change_m=change_m,
+                iterations=result.iterations,
+                expansions=result.expansions,
+                changed_m=np.zeros((0, 3), dtype=np.float32) if changed_m is None else changed_m,
+                trajectory_m=new_m.astype(np.float32),
+            )
+        )
+
+    def _moving(self, time_s: float) -> bool:
+        return self.trajectory is not None and time_s < self.trajectory.end_s
+
+    def _brake(self, time_s: float, reason: str) -> None:
+        """Leave the trajectory and stop; hold where that ends."""
+        self.failure = reason
+        if self._moving(time_s) and not self._stopping():
+            position_m, velocity_mps, acceleration_mps2 = self._planned_state(time_s)
+            self.trajectory = braking_trajectory(
+                time_s, position_m, velocity_mps, acceleration_mps2, self.limits
+            )
+            self.goal = None
+
+    def _stopping(self) -> bool:
+        return self.trajectory is not None and self.goal is None
+
+
+def with_stop(trajectory: Trajectory, limits: Limits) -> Trajectory:
+    """The trajectory, with a stop after its end when it does not end at rest.
+
+    What is flown when no further plan arrives, so triggers and the brake watch it too.
+    """
+    if trajectory.at_rest:
+        return trajectory
+    end_s = trajectory.end_s
+    position, velocity, acceleration = evaluate(trajectory, np.array([end_s]))
+    stop = braking_trajectory(end_s, position[0], velocity[0], acceleration[0], limits)
+    terms = max(trajectory.coefficients.shape[1], stop.coefficients.shape[1])
+    pieces = [
+        np.pad(part.coefficients, ((0, 0), (0, terms - part.coefficients.shape[1]), (0, 0)))
+        for part in (trajectory, stop)
+    ]
+    return Trajectory(
+        breaks_s=np.concatenate([trajectory.breaks_s, stop.breaks_s[1:]]),
+        coefficients=np.concatenate(pieces),
+        at_rest=True,
+    )
+
+
+def _samples(trajectory: Trajectory, from_s: float) -> Float:
+    return evaluate(trajectory, sample_times(trajectory, from_s, _SAMPLE_S))[0]
+
+
+def _path_change_m(old_m: Float, new_m: Float) -> float:
+    """Largest distance of a point of the old path from the new path (one-sided Hausdorff)."""
+    between_m = np.linalg.norm(old_m[:, None] - new_m[None], axis=2)
+    return float(between_m.min(axis=1).max())

@@ -1,0 +1,155 @@
+"""Collects the rows of a trial's log while it flies, and the clock times beside it."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import ndimage
+
+from uavexp.mapping.base import OCCUPIED, DistanceField
+from uavexp.scene import Scene
+from uavexp.types import (
+    Contact,
+    Float,
+    Limits,
+    Observation,
+    Outcome,
+    Reference,
+    Replan,
+    State,
+    TrialLog,
+    World,
+)
+
+
+@dataclass(slots=True)
+class Stopwatch:
+    """Clock times of the parts; measured beside the flight, never an input to it."""
+
+    laps_s: dict[str, list[float]] = field(default_factory=dict)
+
+    @contextmanager
+    def lap(self, name: str) -> Iterator[None]:
+        """Time the block under this name."""
+        begin = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.add(name, time.perf_counter() - begin)
+
+    def add(self, name: str, lap_s: float) -> None:
+        """Add a lap that was timed elsewhere."""
+        self.laps_s.setdefault(name, []).append(lap_s)
+
+
+@dataclass(slots=True)
+class Recorder:
+    """Rows of the log: one per step, one per ESDF update, and the goals pursued."""
+
+    steps: list[tuple[float, Float, Float, Float, Float, Float, Float]] = field(default_factory=list)
+    ticks: list[tuple[float, float, int, float]] = field(default_factory=list)
+    goals_m: list[Float] = field(default_factory=list)
+
+    @property
+    def end_s(self) -> float:
+        """Time of the last row."""
+        return self.steps[-1][0]
+
+    def step(self, time_s: float, state: State, estimate: State, reference: Reference) -> None:
+        """Add the row of one simulation step."""
+        self.steps.append(
+            (
+                time_s,
+                state.position_m,
+                state.velocity_mps,
+                state.quaternion_wxyz,
+                estimate.position_m,
+                reference.position_m,
+                reference.acceleration_mps2,
+            )
+        )
+
+    def tick(self, observation: Observation, score: float) -> None:
+        """Add the row of one ESDF update, and the goal if it is a new one."""
+        clearance_m = float(observation.field.distance_m(observation.state.position_m[None])[0])
+        self.ticks.append((observation.time_s, clearance_m, len(observation.update.voxel), score))
+        goal = observation.goal
+        if goal is not None and not (self.goals_m and np.array_equal(self.goals_m[-1], goal.position_m)):
+            self.goals_m.append(goal.position_m)
+
+    def moved_m(self, steps: int) -> float:
+        """Largest distance from the present position in the last so many steps; inf before that."""
+        if len(self.steps) <= steps:
+            return math.inf
+        recent_m = np.stack([row[1] for row in self.steps[-steps - 1 :: 100]])
+        return float(np.linalg.norm(recent_m - self.steps[-1][1], axis=1).max())
+
+    def log(
+        self,
+        *,
+        outcome: Outcome,
+        reason: str,
+        step_s: float,
+        scene: Scene,
+        field: DistanceField,
+        replans: tuple[Replan, ...],
+        dropped_triggers: int,
+        contacts: tuple[Contact, ...],
+        seen_share: float,
+        watch: Stopwatch,
+    ) -> TrialLog:
+        """Return the finished log; true clearances are measured here, all at once."""
+        times, position, velocity, quaternion, estimated, reference, acceleration = zip(
+            *self.steps, strict=True
+        )
+        tick_s, esdf_m, changed, score = zip(*self.ticks, strict=True)
+        mapped = np.flatnonzero(field.state == OCCUPIED)
+        return TrialLog(
+            outcome=outcome,
+            reason=reason,
+            step_s=step_s,
+            time_s=np.array(times),
+            position_m=np.stack(position),
+            velocity_mps=np.stack(velocity),
+            quaternion_wxyz=np.stack(quaternion),
+            estimated_position_m=np.stack(estimated),
+            reference_position_m=np.stack(reference),
+            reference_acceleration_mps2=np.stack(acceleration),
+            clearance_m=scene.distance_m(np.stack(position)),
+            tick_s=np.array(tick_s),
+            esdf_clearance_m=np.array(esdf_m),
+            changed_voxels=np.array(changed, dtype=np.int64),
+            decision_score=np.array(score),
+            replans=replans,
+            dropped_triggers=dropped_triggers,
+            contacts=contacts,
+            goals_m=np.array(self.goals_m).reshape(-1, 3),
+            seen_share=seen_share,
+            mapped_m=field.voxel_centres_m(mapped).astype(np.float32),
+            wall_s={name: np.array(laps) for name, laps in watch.laps_s.items()},
+        )
+
+
+def seen_share(
+    world: World, scene: Scene, field: DistanceField, limits: Limits, cell_m: float = 0.25
+) -> float:
+    """Observed share of the reachable volume, 0 to 1.
+
+    Reachable: cells of the flight bounds whose true clearance exceeds the body's radius,
+    face-connected to the start.
+    """
+    low, high = world.flight_bounds_m
+    axes = [np.arange(low[axis] + 0.5 * cell_m, high[axis], cell_m) for axis in range(3)]
+    cells_m = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    clear = scene.distance_m(cells_m.reshape(-1, 3)).reshape(cells_m.shape[:3]) > limits.body_radius_m
+    label, _ = ndimage.label(clear)
+    start = np.unravel_index(
+        np.argmin(np.where(clear, np.linalg.norm(cells_m - world.start_m, axis=-1), np.inf)), clear.shape
+    )
+    reachable = label == label[start]
+    return float(field.observed(cells_m[reachable]).mean())

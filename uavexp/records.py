@@ -1,0 +1,158 @@
+"""One trial to disk and back.
+
+`record.json` is canonical JSON (sorted keys, shortest round-trip numbers) with its own
+sha256. It holds no clock, path or worker count: the same configuration and seed give the
+same bytes. JSON has no NaN; here NaN is null and the infinities are the words "inf" and
+"-inf". The arrays of the flight are in `log.npz`, whose content the record's `log` digest
+names; what may differ from run to run (clock times, the command) is in `wall.json`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+import tempfile
+from collections.abc import Callable, Mapping
+from enum import Enum
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from uavexp.errors import RecordError
+from uavexp.paths import PACKAGE, checkout_root, conf_folder
+
+SCHEMA = 1
+RECORD, WALL, LOG, PICTURE = "record.json", "wall.json", "log.npz", "picture.png"
+
+
+def canonical_json(value: Any) -> str:
+    """JSON with sorted keys and no spaces; the same value always gives the same text."""
+    return json.dumps(
+        _jsonable(value), sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False
+    )
+
+
+def digest(value: Any) -> str:
+    """sha256 (hex) of a value's canonical JSON."""
+    return hashlib.sha256(canonical_json(value).encode()).hexdigest()
+
+
+def seal(record: Mapping[str, Any]) -> str:
+    """Text of `record.json`: the record, its schema version and its sha256, one key a line."""
+    body = {**_jsonable(record), "schema": SCHEMA}
+    lines = [
+        f"{json.dumps(key)}:{canonical_json(value)}"
+        for key, value in sorted({**body, "sha256": digest(body)}.items())
+    ]
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def read_record(path: Path) -> dict[str, Any]:
+    """Read a record and verify its sha256.
+
+    Args:
+        path: of a `record.json`, or of the folder that holds one.
+
+    Returns:
+        The record without its seal; null metrics are NaN again.
+
+    Raises:
+        RecordError: missing, not JSON, changed since it was written, or of another schema.
+    """
+    file = path / RECORD if path.is_dir() else path
+    try:
+        record = json.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise RecordError(f"{file}: cannot be read ({error.strerror})") from error
+    except ValueError as error:
+        raise RecordError(f"{file}: damaged, not JSON") from error
+    if not isinstance(record, dict) or "sha256" not in record:
+        raise RecordError(f"{file}: damaged, no sha256")
+    if record.pop("sha256") != digest(record):
+        raise RecordError(f"{file}: damaged, its content does not match its sha256")
+    if record.get("schema") != SCHEMA:
+        raise RecordError(f"{file}: schema {record.get('schema')}, this version reads {SCHEMA}")
+    record["metrics"] = {key: restore(value) for key, value in record.get("metrics", {}).items()}
+    return record
+
+
+def restore(value: Any) -> Any:
+    """A number as it was before canonical JSON: null is NaN, "inf" infinite."""
+    if value is None:
+        return math.nan
+    return float(value) if value in ("inf", "-inf") else value
+
+
+def write_atomically(path: Path, write: Callable[[IO[bytes]], None]) -> None:
+    """Write a file so that it is there whole or not at all: temporary name, fsync, rename.
+
+    Raises:
+        RecordError: the folder cannot be written or the disk is full; nothing is left behind.
+    """
+    temporary = None
+    try:
+        with tempfile.NamedTemporaryFile(
+            dir=path.parent, prefix=f".{path.stem}-", suffix=f"{path.suffix}.part", delete=False
+        ) as file:
+            temporary = Path(file.name)
+            write(file)
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.chmod(0o666 & ~_umask())
+        temporary.replace(path)
+    except OSError as error:
+        raise RecordError(f"{path}: cannot be written ({error.strerror or error})") from error
+    finally:
+        if temporary is not None:
+            temporary.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file atomically, UTF-8."""
+    write_atomically(path, lambda file: _write_all(file, text.encode()))
+
+
+def code_digest() -> str:
+    """sha256 over the package's source and configuration, file names included."""
+    total = hashlib.sha256()
+    for name, root, pattern in (("uavexp", PACKAGE, "*.py"), ("conf", conf_folder(), "*.yaml")):
+        for file in sorted(root.rglob(pattern)):
+            total.update(f"{name}/{file.relative_to(root).as_posix()}\0".encode())
+            total.update(hashlib.sha256(file.read_bytes()).digest())
+    return total.hexdigest()
+
+
+def lock_digest() -> str | None:
+    """sha256 of the checkout's `requirements.lock`; None when the package is installed without one."""
+    root = checkout_root()
+    file = root / "requirements.lock" if root else None
+    return hashlib.sha256(file.read_bytes()).hexdigest() if file and file.is_file() else None
+
+
+def _jsonable(value: Any) -> Any:
+    if isinstance(value, Enum):
+        return value.value
+    if isinstance(value, np.generic):
+        return _jsonable(value.item())
+    if isinstance(value, np.ndarray):
+        return _jsonable(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None if math.isnan(value) else ("inf" if value > 0.0 else "-inf")
+    if isinstance(value, Mapping):
+        return {str(key): _jsonable(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_jsonable(item) for item in value]
+    return value
+
+
+def _write_all(file: IO[bytes], data: bytes) -> None:
+    file.write(data)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

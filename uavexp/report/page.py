@@ -1,0 +1,105 @@
+"""Where the parts of a trial's picture stand on the page, in inches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from matplotlib.figure import Figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+WIDTH_IN = 11.0
+LEFT_IN, RIGHT_IN, BOTTOM_IN, HEADER_IN = 0.6, 0.25, 0.5, 0.68
+PANEL_IN, PANEL_GAP_IN = 1.35, 0.16
+LEGEND_IN, AXIS_LABEL_IN = 0.62, 0.42
+PLAN_HEIGHT_IN = (2.2, 6.6)  # least and greatest
+SIDE_PLAN_HEIGHT_IN, SIDE_PLAN_WIDTH_IN = 7.0, 5.6
+COLUMN_GAP_IN = 0.75
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Page:
+    """A figure with its four parts."""
+
+    figure: Figure
+    plan: Axes
+    clearance: Axes
+    tracking: Axes
+    speed_bar: Axes
+    legend_corner: tuple[float, float]  # upper left, share of the figure
+    legend_columns: int
+
+
+def lay_out(size_m: tuple[float, float]) -> Page:
+    """Return a page for a plan of this size: panels below a wide plan, beside a tall one."""
+    return _below(size_m[1] / size_m[0]) if size_m[1] <= size_m[0] else _beside(size_m[1] / size_m[0])
+
+
+def _below(aspect: float) -> Page:
+    width = WIDTH_IN - LEFT_IN - RIGHT_IN
+    plan = min(max(width * aspect, PLAN_HEIGHT_IN[0]), PLAN_HEIGHT_IN[1])
+    tracking_y = BOTTOM_IN
+    clearance_y = tracking_y + PANEL_IN + PANEL_GAP_IN
+    legend_y = clearance_y + PANEL_IN + 0.1
+    plan_y = legend_y + LEGEND_IN + AXIS_LABEL_IN
+    figure = Figure(figsize=(WIDTH_IN, plan_y + plan + HEADER_IN))
+    bar_width = 1.7
+    return _page(
+        figure,
+        plan=(LEFT_IN, plan_y, width, plan),
+        clearance=(LEFT_IN, clearance_y, width, PANEL_IN),
+        tracking=(LEFT_IN, tracking_y, width, PANEL_IN),
+        speed_bar=(WIDTH_IN - RIGHT_IN - bar_width, legend_y + 0.4, bar_width, 0.1),
+        legend=(LEFT_IN - 0.1, legend_y + LEGEND_IN),
+        columns=6,
+    )
+
+
+def _beside(aspect: float) -> Page:
+    plan_width = min(SIDE_PLAN_HEIGHT_IN / aspect, SIDE_PLAN_WIDTH_IN)
+    x = LEFT_IN + plan_width + COLUMN_GAP_IN
+    width = WIDTH_IN - RIGHT_IN - x
+    panel = 2.2
+    clearance_y = BOTTOM_IN + panel + PANEL_GAP_IN
+    figure = Figure(figsize=(WIDTH_IN, BOTTOM_IN + SIDE_PLAN_HEIGHT_IN + HEADER_IN))
+    top = BOTTOM_IN + SIDE_PLAN_HEIGHT_IN
+    return _page(
+        figure,
+        plan=(LEFT_IN, BOTTOM_IN, plan_width, SIDE_PLAN_HEIGHT_IN),
+        clearance=(x, clearance_y, width, panel),
+        tracking=(x, BOTTOM_IN, width, panel),
+        speed_bar=(x + 0.05, clearance_y + panel + 0.55, 1.7, 0.1),
+        legend=(x - 0.1, top + 0.05),
+        columns=2,
+    )
+
+
+_Box = tuple[float, float, float, float]
+
+
+def _page(
+    figure: Figure,
+    *,
+    plan: _Box,
+    clearance: _Box,
+    tracking: _Box,
+    speed_bar: _Box,
+    legend: tuple[float, float],
+    columns: int,
+) -> Page:
+    width, height = figure.get_size_inches()
+
+    def add(box: _Box) -> Axes:
+        return figure.add_axes((box[0] / width, box[1] / height, box[2] / width, box[3] / height))
+
+    return Page(
+        figure=figure,
+        plan=add(plan),
+        clearance=add(clearance),
+        tracking=add(tracking),
+        speed_bar=add(speed_bar),
+        legend_corner=(legend[0] / width, legend[1] / height),
+        legend_columns=columns,
+    )

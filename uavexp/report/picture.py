@@ -1,0 +1,210 @@
+"""The picture of one trial: where it flew, why it replanned, how near it came, how well it tracked."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from uavexp.metrics import replanning
+from uavexp.report import page, plan_view, style
+from uavexp.types import TrialLog, World
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.colors import Normalize
+
+Values = Mapping[str, bool | int | float | str]
+
+DPI = 120
+MOST_POINTS = 4000  # of a curve over time
+
+
+def draw(world: World, log: TrialLog, metrics: Values, title: str, path: Path) -> None:
+    """Write the picture of one trial as a PNG; the same trial gives the same bytes.
+
+    Args:
+        world: the truth.
+        log: the flight; may be empty or a single row (an error before the first step).
+        metrics: of `uavexp.metrics.evaluate`, with `seed` and `strategy` when there are any.
+        title: the command that repeats the trial.
+        path: of the PNG file to write.
+    """
+    with style.house_style():
+        view = plan_view.view_m(world, log)
+        size_m = view[1] - view[0]
+        sheet = page.lay_out((float(size_m[0]), float(size_m[1])))
+        FigureCanvasAgg(sheet.figure)
+        speed_scale = plan_view.draw(sheet.plan, world, log, view)
+        _draw_speed_bar(sheet.speed_bar, speed_scale)
+        _draw_clearance(sheet.clearance, log, _number(metrics, "safety_threshold_m"))
+        _draw_tracking(sheet.tracking, log)
+        _draw_legend(sheet, log)
+        _draw_header(sheet, world, log, metrics, title)
+        sheet.figure.savefig(path, dpi=DPI, format="png", metadata={"Software": None})
+
+
+def _number(metrics: Values, name: str) -> float:
+    return float(metrics.get(name, math.nan))
+
+
+def _draw_speed_bar(axes: Axes, scale: Normalize) -> None:
+    bar = axes.figure.colorbar(
+        ScalarMappable(scale, plan_view.SPEED_COLOURS),
+        cax=axes,
+        orientation="horizontal",
+        label="flown speed [m/s]",
+    )
+    bar.outline.set_linewidth(0.4)
+    axes.tick_params(length=2, pad=1.5, labelsize=7)
+    axes.xaxis.labelpad = 1.0
+
+
+def _draw_clearance(axes: Axes, log: TrialLog, safety_threshold_m: float) -> None:
+    """Draw true and mapped clearance over time, with the threshold and the contacts."""
+    stride = max(1, log.time_s.size // MOST_POINTS)
+    time_s, clearance_m = log.time_s[::stride], log.clearance_m[::stride]
+    axes.plot(log.tick_s, log.esdf_clearance_m, color=style.ORANGE, lw=1.0, label="in the map (ESDF)")
+    axes.plot(time_s, clearance_m, color=style.BLUE, lw=1.3, label="true")
+    if math.isfinite(safety_threshold_m):
+        axes.axhline(
+            safety_threshold_m, color=style.BLACK, lw=0.8, ls=(0, (4, 2)), label=f"{safety_threshold_m:g} m"
+        )
+        below = clearance_m < safety_threshold_m
+        axes.fill_between(
+            time_s, clearance_m, safety_threshold_m, where=below, color=style.VERMILLION, alpha=0.45, lw=0
+        )
+    for contact in log.contacts:
+        axes.axvspan(contact.start_s, contact.end_s, color=style.VERMILLION, alpha=0.25, lw=0)
+        axes.plot(
+            contact.start_s, 0.0, "X", color=style.VERMILLION, mec=style.BLACK, mew=0.6, ms=7, clip_on=False
+        )
+    axes.set_ylim(bottom=0.0)
+    axes.set_ylabel("clearance [m]")
+    axes.tick_params(labelbottom=False)
+    _finish_panel(axes, log)
+
+
+def _draw_tracking(axes: Axes, log: TrialLog) -> None:
+    """Draw the tracking error over time, with a tick for every replan."""
+    stride = max(1, log.time_s.size // MOST_POINTS)
+    error_m = np.linalg.norm(log.position_m - log.reference_position_m, axis=-1)
+    axes.plot(log.time_s[::stride], error_m[::stride], color=style.BLUE, lw=1.1)
+    size_pt = plan_view.marker_size_pt(log) - 1.5
+    top = {"transform": axes.get_xaxis_transform(), "clip_on": False, "zorder": 5}
+    for replan in replanning.failed(log):
+        axes.plot(replan.time_s, 1.0, **style.failed_marker(replan.cause, size_pt), **top)
+    for replan in replanning.executed(log):
+        axes.axvline(replan.time_s, color=style.cause_mark(replan.cause).colour, lw=0.7, alpha=0.8, zorder=1)
+        axes.plot(replan.time_s, 1.0, **style.marker(replan.cause, size_pt), **top)
+    axes.set_ylim(bottom=0.0)
+    axes.set(xlabel="time [s]", ylabel="tracking error [m]")
+    _finish_panel(axes, log, legend=False)
+
+
+def _finish_panel(axes: Axes, log: TrialLog, *, legend: bool = True) -> None:
+    axes.grid(visible=True)
+    axes.spines[["top", "right"]].set_visible(False)
+    end_s = float(log.time_s[-1]) if log.time_s.size else 0.0
+    axes.set_xlim(0.0, max(end_s, 1.0))
+    if log.time_s.size < 2:
+        axes.text(0.5, 0.5, "no flight", transform=axes.transAxes, ha="center", va="center", color="#606060")
+    elif legend:
+        axes.legend(loc="upper right", ncols=3, handlelength=1.6, borderaxespad=0.1)
+
+
+def _draw_legend(sheet: page.Page, log: TrialLog) -> None:
+    handles = [
+        Line2D([], [], color=plan_view.SPEED_COLOURS(0.7), lw=2.2, label="flown"),
+        Line2D([], [], color=style.BLACK, lw=0.9, ls="--", label="true shortest path"),
+        Line2D([], [], color=style.SKY, lw=1.0, label="plans"),
+        Patch(color=style.SURFACE, label="true surfaces"),
+        Patch(color=style.SOLID, label="solid or shut off"),
+        Line2D([], [], color=style.MAPPED, marker="s", ls="", ms=3, mew=0, label="mapped as occupied"),
+        Line2D([], [], color="white", marker="o", ls="", mec=style.BLACK, mew=1.3, ms=7, label="start"),
+        Line2D(
+            [], [], color=style.YELLOW, marker="*", ls="", mec=style.BLACK, mew=0.8, ms=12, label="target"
+        ),
+        *_event_handles(log),
+    ]
+    sheet.figure.legend(
+        handles=handles,
+        loc="upper left",
+        bbox_to_anchor=sheet.legend_corner,
+        ncols=sheet.legend_columns,
+        handlelength=1.5,
+        labelspacing=0.35,
+        borderaxespad=0.0,
+    )
+
+
+def _event_handles(log: TrialLog) -> list[Line2D]:
+    """One entry per cause that occurred, in order of first occurrence, with its count."""
+    taken = Counter(replan.cause for replan in replanning.executed(log))
+    failed = len(replanning.failed(log))
+    handles = [
+        Line2D([], [], label=f"replan: {cause} ({count})", **style.marker(cause, 8.0))
+        for cause, count in taken.items()
+    ]
+    if failed:
+        hollow = {"marker": "o", "ls": "", "mfc": "white", "mec": "#606060", "mew": 1.2, "ms": 6.5}
+        handles.append(Line2D([], [], label=f"hollow: no plan found ({failed})", **hollow))
+    if log.contacts:
+        label = f"contact ({len(log.contacts)})"
+        handles.append(
+            Line2D(
+                [], [], color=style.VERMILLION, marker="X", ls="", mec=style.BLACK, mew=0.7, ms=9, label=label
+            )
+        )
+    return handles
+
+
+def _draw_header(sheet: page.Page, world: World, log: TrialLog, metrics: Values, title: str) -> None:
+    """Write what was flown, how it ended, the key numbers, and the command that repeats it."""
+    height_in = sheet.figure.get_figheight()
+    left = page.LEFT_IN / page.WIDTH_IN
+    names = [str(metrics[name]) for name in ("strategy",) if name in metrics] + [world.name]
+    names += [f"seed {metrics['seed']}"] if "seed" in metrics else []
+    ending = str(log.outcome) + (
+        f" ({textwrap.shorten(log.reason, 80, placeholder=' …')})" if log.reason else ""
+    )
+    head = f"{' · '.join(names)}: {ending}"
+    sheet.figure.text(left, 1.0 - 0.23 / height_in, head, fontsize=12, fontweight="bold", va="center")
+    sheet.figure.text(left, 1.0 - 0.43 / height_in, _key_numbers(metrics), fontsize=9, va="center")
+    command = textwrap.shorten(title, 170, placeholder=" …")
+    size = min(8.0, 8.0 * 150 / max(len(command), 1))
+    sheet.figure.text(
+        left,
+        1.0 - 0.59 / height_in,
+        command,
+        fontsize=size,
+        family="DejaVu Sans Mono",
+        color="#505050",
+        va="center",
+    )
+
+
+def _key_numbers(metrics: Values) -> str:
+    def value(name: str, digits: int, unit: str = "") -> str:
+        number = _number(metrics, name)
+        return f"{number:.{digits}f}{unit}" if math.isfinite(number) else "–"
+
+    return "    ".join(
+        (
+            f"path {value('path_length_m', 1, ' m')} (shortest {value('shortest_path_m', 1, ' m')})",
+            f"time {value('completion_time_s', 1, ' s')}",
+            f"contacts {value('collision_count', 0)}",
+            f"least clearance {value('min_clearance_m', 2, ' m')}",
+            f"replans {value('replans', 0)}",
+            f"tracking RMSE {value('tracking_error_m', 3, ' m')}",
+        )
+    )

@@ -1,0 +1,132 @@
+"""The plan of a trial: true and mapped obstacles, the flown path, the replans, the contacts."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.colors import LinearSegmentedColormap, ListedColormap, Normalize
+
+from uavexp.metrics import replanning
+from uavexp.report import section, style
+from uavexp.types import Float, TrialLog, World
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+BAND_M = 0.5  # the plan shows what stands within this of the flight height
+MARGIN_M = 3.0  # around everything flown
+LEAST_CELL_M, MOST_CELLS = 0.025, 2000  # of the section
+MOST_SEGMENTS = 3000  # of the flown path
+SPEED_COLOURS = LinearSegmentedColormap.from_list("speed", ["#8CC4EA", "#2F86C1", "#0A2F5C"])
+
+
+def view_m(world: World, log: TrialLog) -> Float:
+    """Corners (2, 2) of the plan: start, target and everything flown with a margin, inside the world."""
+    places = _visited_m(world, log)[:, :2]
+    bounds_m = world.bounds_m[:, :2]
+    lower_m = np.maximum(places.min(axis=0) - MARGIN_M, bounds_m[0])
+    upper_m = np.minimum(places.max(axis=0) + MARGIN_M, bounds_m[1])
+    return np.stack([lower_m, upper_m])
+
+
+def draw(axes: Axes, world: World, log: TrialLog, view: Float) -> Normalize:
+    """Draw the plan on `axes`; return the scale of the path's colours, m/s."""
+    heights_m = _band_m(world)
+    _draw_truth(axes, world, log, heights_m)
+    _draw_mapped(axes, log, heights_m, view)
+    axes.plot(world.shortest_path[:, 0], world.shortest_path[:, 1], "--", color=style.BLACK, lw=0.9, zorder=4)
+    for replan in log.replans:
+        points = replan.trajectory_m
+        axes.plot(points[:, 0], points[:, 1], color=style.SKY, lw=0.6, alpha=0.6, zorder=3)
+    scale = _draw_path(axes, log)
+    _draw_events(axes, log)
+    _draw_task(axes, world)
+    axes.set(xlim=view[:, 0], ylim=view[:, 1], aspect="equal", xlabel="x [m]", ylabel="y [m]")
+    return scale
+
+
+def _visited_m(world: World, log: TrialLog) -> Float:
+    """Places (N, 3) known to be free: start, target, the shortest and the flown path."""
+    ends = np.stack([world.start_m, world.target_m])
+    return np.concatenate([ends, world.shortest_path.reshape(-1, 3), log.position_m.reshape(-1, 3)])
+
+
+def _band_m(world: World) -> tuple[float, float]:
+    """Heights shown: around the start's, floor and ceiling left out by the flight bounds."""
+    height_m = float(world.start_m[2])
+    lowest_m, highest_m = world.flight_bounds_m[:, 2]
+    return max(height_m - BAND_M, float(lowest_m)), min(height_m + BAND_M, float(highest_m))
+
+
+def _draw_truth(axes: Axes, world: World, log: TrialLog, heights_m: tuple[float, float]) -> None:
+    extent_m = float(np.max(world.bounds_m[1, :2] - world.bounds_m[0, :2]))
+    cell_m = max(LEAST_CELL_M, extent_m / MOST_CELLS)
+    plan = section.cut(world, heights_m, _visited_m(world, log), cell_m)
+    axes.imshow(
+        plan.cells.T,
+        cmap=ListedColormap(["#FFFFFF", style.SOLID, style.SURFACE]),
+        vmin=0,
+        vmax=2,
+        origin="lower",
+        extent=(plan.lower_m[0], plan.upper_m[0], plan.lower_m[1], plan.upper_m[1]),
+        interpolation="nearest",
+        zorder=0,
+    )
+
+
+def _draw_mapped(axes: Axes, log: TrialLog, heights_m: tuple[float, float], view: Float) -> None:
+    """Draw a square per column of voxels mapped as occupied, half a voxel wide."""
+    mapped_m = log.mapped_m.reshape(-1, 3)
+    inside = (mapped_m[:, 2] >= heights_m[0]) & (mapped_m[:, 2] <= heights_m[1])
+    columns_m = np.unique(np.round(mapped_m[inside, :2].astype(np.float64), 3), axis=0)
+    if not columns_m.size:
+        return
+    gaps_m = np.diff(np.unique(columns_m[:, 0]))
+    voxel_m = float(gaps_m.min()) if gaps_m.size else 0.1
+    width_pt = axes.get_window_extent().width / axes.figure.dpi * 72.0
+    size_pt = 0.5 * voxel_m / float(view[1, 0] - view[0, 0]) * width_pt
+    axes.plot(
+        columns_m[:, 0], columns_m[:, 1], "s", color=style.MAPPED, ms=max(size_pt, 0.7), mew=0, zorder=2
+    )
+
+
+def _draw_path(axes: Axes, log: TrialLog) -> Normalize:
+    """Draw the flown path in the colours of its speed."""
+    speed_mps = np.linalg.norm(log.velocity_mps.reshape(-1, 3), axis=1)
+    scale = Normalize(0.0, max(0.5, math.ceil(2.0 * speed_mps.max(initial=0.0)) / 2.0))
+    stride = max(1, speed_mps.size // MOST_SEGMENTS)
+    points = log.position_m.reshape(-1, 3)[::stride, :2]
+    if points.shape[0] > 1:
+        segments = list(np.stack([points[:-1], points[1:]], axis=1))
+        for width, values, zorder in ((3.4, None, 5.0), (2.0, speed_mps[::stride][:-1], 5.1)):
+            lines = LineCollection(
+                segments, linewidths=width, colors="white", cmap=SPEED_COLOURS, norm=scale, zorder=zorder
+            )
+            lines.set_array(values)
+            axes.add_collection(lines, autolim=False)
+    return scale
+
+
+def _draw_events(axes: Axes, log: TrialLog) -> None:
+    size_pt = marker_size_pt(log)
+    for replan in replanning.failed(log):
+        axes.plot(*replan.position_m[:2], zorder=7, **style.failed_marker(replan.cause, size_pt))
+    for replan in replanning.executed(log):
+        axes.plot(*replan.position_m[:2], zorder=7.1, **style.marker(replan.cause, size_pt))
+    for contact in log.contacts:
+        axes.plot(
+            *contact.position_m[:2], "X", color=style.VERMILLION, mec=style.BLACK, mew=0.7, ms=9.5, zorder=8
+        )
+
+
+def marker_size_pt(log: TrialLog) -> float:
+    """Size of a replan's marker: smaller when there are many."""
+    return 7.5 if len(log.replans) < 40 else 5.0
+
+
+def _draw_task(axes: Axes, world: World) -> None:
+    axes.plot(*world.start_m[:2], "o", color="white", mec=style.BLACK, mew=1.4, ms=8, zorder=6)
+    axes.plot(*world.target_m[:2], "*", color=style.YELLOW, mec=style.BLACK, mew=0.9, ms=15, zorder=6)

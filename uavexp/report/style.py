@@ -1,0 +1,94 @@
+"""The look of every figure: colours that the colour-blind and a grey printer can tell apart."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import matplotlib
+
+# Okabe and Ito 2008, "Color universal design"
+BLACK = "#000000"
+ORANGE = "#E69F00"
+SKY = "#56B4E9"
+GREEN = "#009E73"
+YELLOW = "#F0E442"
+BLUE = "#0072B2"
+VERMILLION = "#D55E00"
+PURPLE = "#CC79A7"
+
+SURFACE = "#8C8C8C"  # true obstacles' surfaces
+SOLID = "#E4E4E4"  # inside them, or shut off from the flight
+MAPPED = "#2A2A2A"  # occupied voxels of the vehicle's map
+FAINT = "#C8C8C8"  # grid lines, frames
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """How one cause of replanning is drawn: never by colour alone."""
+
+    colour: str
+    marker: str
+
+
+CAUSE_MARKS = {
+    "map": Mark(ORANGE, "^"),
+    "goal": Mark(GREEN, "D"),
+    "clock": Mark(PURPLE, "s"),
+    "brake": Mark(BLACK, "v"),
+}
+OTHER_MARK = Mark(YELLOW, "P")
+
+
+def cause_mark(cause: str) -> Mark:
+    """Return how a replan of this cause is drawn."""
+    return CAUSE_MARKS.get(cause, OTHER_MARK)
+
+
+def marker(cause: str, size_pt: float) -> dict[str, Any]:
+    """Line2D settings of a replan that took effect."""
+    look = cause_mark(cause)
+    fill = {"color": look.colour, "mec": "white", "mew": 0.6}
+    return {"marker": look.marker, "ls": "", "ms": size_pt, **fill}
+
+
+def failed_marker(cause: str, size_pt: float) -> dict[str, Any]:
+    """Line2D settings of a request that brought no plan: the same, hollow."""
+    look = cause_mark(cause)
+    hollow = {"color": look.colour, "mfc": "white", "mew": 1.2}
+    return {"marker": look.marker, "ls": "", "ms": 0.8 * size_pt, **hollow}
+
+
+_SETTINGS: dict[str, object] = {
+    "font.family": ["DejaVu Sans"],  # comes with matplotlib: the same on every machine
+    "font.size": 9.0,
+    "axes.titlesize": 9.0,
+    "axes.labelsize": 9.0,
+    "axes.edgecolor": "#606060",
+    "axes.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "xtick.color": "#404040",
+    "ytick.color": "#404040",
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "grid.color": FAINT,
+    "grid.linewidth": 0.4,
+    "legend.fontsize": 8.0,
+    "legend.frameon": False,
+    "legend.handletextpad": 0.4,
+    "legend.columnspacing": 1.4,
+    "lines.solid_capstyle": "round",
+}
+
+
+@contextmanager
+def house_style() -> Iterator[None]:
+    """Draw in the house style, whatever a user's own matplotlib settings are."""
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(_SETTINGS)
+        yield

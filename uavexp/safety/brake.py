@@ -1,0 +1,57 @@
+"""Stop in time: when the flown trajectory meets a mapped obstacle or leaves known-free space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from uavexp.errors import require, require_non_negative
+from uavexp.geometry import evaluate, sample_times
+from uavexp.types import Limits, Observation
+
+_SAMPLE_S = 0.04  # at 2.5 m/s one voxel apart
+
+
+@dataclass(slots=True, kw_only=True)
+class Brake:
+    """Brakes when the path within the stopping distance ahead is not known to be free."""
+
+    margin_m: float = 0.05
+    reaction_s: float = 0.2
+    stop_at_unknown: bool = True
+    _limits: Limits | None = field(init=False, repr=False, default=None)
+
+    def __post_init__(self) -> None:
+        require_non_negative(margin_m=self.margin_m, reaction_s=self.reaction_s)
+
+    def reset(self, limits: Limits) -> None:
+        """Begin a trial."""
+        require(limits.max_acceleration_mps2 > 0.0, "max_acceleration_mps2 must be > 0 to brake")
+        self._limits = limits
+
+    def must_brake(self, observation: Observation) -> bool:
+        """Whether the trajectory, up to the stopping distance ahead, is blocked or unknown.
+
+        The look-ahead distance is v²/(2a), plus what is flown in `reaction_s` (one ESDF
+        period and the latency), plus the body's radius.
+        """
+        limits, trajectory = self._limits, observation.trajectory
+        if limits is None or trajectory is None:
+            return False
+        times_s = sample_times(trajectory, observation.time_s, _SAMPLE_S)
+        points_m = evaluate(trajectory, times_s)[0]
+        speed_mps = float(np.linalg.norm(observation.reference.velocity_mps))
+        if speed_mps < 0.05 or len(points_m) < 2:
+            return False
+        ahead_m = (
+            speed_mps * speed_mps / (2.0 * limits.max_acceleration_mps2)
+            + speed_mps * self.reaction_s
+            + limits.body_radius_m
+        )
+        along_m = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points_m, axis=0), axis=1)))
+        near = points_m[along_m <= ahead_m]
+        blocked = observation.field.distance_m(near) < limits.body_radius_m + self.margin_m
+        if self.stop_at_unknown:
+            blocked |= ~observation.field.observed(near)
+        return bool(blocked.any())

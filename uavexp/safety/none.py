@@ -1,0 +1,19 @@
+"""No braking outside the trigger's word: the paper's comparison."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from uavexp.types import Limits, Observation
+
+
+@dataclass(slots=True, kw_only=True)
+class NoBrake:
+    """Never brakes; or nobody would ever collide and triggers could not be compared."""
+
+    def reset(self, limits: Limits) -> None:
+        """Begin a trial."""
+
+    def must_brake(self, observation: Observation) -> bool:
+        """Return False."""
+        return False

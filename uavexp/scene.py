@@ -1,0 +1,104 @@
+"""Questions to the true geometry: rays, distances, and whether a box touches it.
+
+Rays and distances come from Open3D's RaycastingScene on one thread (Embree, float32);
+touching is exact in float64 (`triangle_grid`).
+"""
+
+from __future__ import annotations
+
+from typing import cast
+
+import numpy as np
+
+from uavexp import triangle_grid
+from uavexp.o3d import open3d
+from uavexp.types import Float, Float32, Int32, World
+
+_THREADS = 1  # records must not depend on the machine
+
+
+class Scene:
+    """The true geometry of a world; immutable after construction.
+
+    Args:
+        world: its `vertices_m` and `triangles`; none at all means empty space.
+    """
+
+    __slots__ = ("_grid", "_raycasting", "_triangles", "_vertices")
+
+    def __init__(self, world: World) -> None:
+        self._build(world.vertices_m, world.triangles)
+
+    @classmethod
+    def from_mesh(cls, vertices_m: Float32, triangles: Int32) -> Scene:
+        """Return the scene of vertices (V, 3) and triangles (F, 3), before there is a `World`."""
+        scene = cls.__new__(cls)
+        scene._build(vertices_m, triangles)
+        return scene
+
+    def _build(self, vertices_m: Float32, triangles: Int32) -> None:
+        self._vertices = np.ascontiguousarray(vertices_m, dtype=np.float32)
+        self._triangles = np.ascontiguousarray(triangles, dtype=np.int32)
+        self._grid: triangle_grid.TriangleGrid | None = None
+        self._raycasting = None
+        if self._triangles.shape[0] > 0:
+            self._raycasting = open3d.t.geometry.RaycastingScene(nthreads=_THREADS)
+            self._raycasting.add_triangles(
+                open3d.core.Tensor(self._vertices), open3d.core.Tensor(self._triangles.astype(np.uint32))
+            )
+
+    def cast(self, rays: Float32) -> tuple[Float32, Float32]:
+        """Intersect rays with the nearest surface.
+
+        Args:
+            rays: origin and direction (N, 6), m; directions of any length > 0.
+
+        Returns:
+            Ray parameter (N,) in units of the direction, inf on a miss; unit normal of the
+            triangle hit (N, 3), either side, 0 on a miss.
+        """
+        if self._raycasting is None:
+            count = rays.shape[0]
+            return np.full(count, np.inf, dtype=np.float32), np.zeros((count, 3), dtype=np.float32)
+        hits = self._raycasting.cast_rays(_tensor(rays), nthreads=_THREADS)
+        return hits["t_hit"].numpy(), hits["primitive_normals"].numpy()
+
+    def distance_m(self, points_m: Float) -> Float:
+        """Unsigned distance (N,) of points (N, 3) to the nearest surface, m; inf in empty space."""
+        if self._raycasting is None:
+            return np.full(points_m.shape[0], np.inf)
+        distance = self._raycasting.compute_distance(_tensor(points_m), nthreads=_THREADS)
+        return cast(Float, distance.numpy().astype(np.float64))
+
+    def closest_point_m(self, points_m: Float) -> Float:
+        """Nearest surface point (N, 3) of points (N, 3), m; inf in empty space."""
+        if self._raycasting is None:
+            return np.full((points_m.shape[0], 3), np.inf)
+        closest = self._raycasting.compute_closest_points(_tensor(points_m), nthreads=_THREADS)
+        return cast(Float, closest["points"].numpy().astype(np.float64))
+
+    def touches(self, position_m: Float, rotation: Float, size_m: Float, margin_m: float = 0.0) -> bool:
+        """Whether an oriented box meets a surface, exactly (a box wholly inside a solid does not).
+
+        Args:
+            position_m: centre of the box (3,).
+            rotation: box to world (3, 3).
+            size_m: length, width, height (3,).
+            margin_m: added on every side, >= 0.
+        """
+        if self._raycasting is None:
+            return False
+        half = 0.5 * np.asarray(size_m, dtype=np.float64) + margin_m
+        return bool(triangle_grid.box_meets_mesh(self.grid, position_m, rotation, half))
+
+    @property
+    def grid(self) -> triangle_grid.TriangleGrid:
+        """The triangles (at least one) sorted into cells, for numba kernels; built at first use."""
+        if self._grid is None:
+            self._grid = triangle_grid.build(self._vertices, self._triangles)
+        return self._grid
+
+
+def _tensor(array: Float | Float32) -> object:
+    """Wrap rows of numbers as a float32 tensor, without a copy when they are float32 already."""
+    return open3d.core.Tensor.from_numpy(np.ascontiguousarray(array, dtype=np.float32))

@@ -1,0 +1,241 @@
+"""RGB-D depth camera: rays through every pixel and the noise of a structured-light sensor.
+
+From the true depth z along the optical axis to the measured one, in this order:
+
+1. missing returns at grazing angles: none where the angle between the ray and the surface
+   normal exceeds `grazing_angle_deg`;
+2. axial noise: z + N(0, sigma(z)), sigma(z) = 0.0012 + 0.0019 (z - 0.4)^2 m (Nguyen, Izadi
+   and Lovell 2012, "Modeling Kinect Sensor Noise", axial noise up to 60°);
+3. disparity quantisation: d = f b / z rounded to a multiple of `disparity_step_px`
+   (Khoshelham and Elberink 2012: 1/8 px; b = 0.075 m, f = 580 px of its infrared camera);
+4. missing returns at depth edges: a pixel at which inverse depth (linear over the image of
+   any plane) has a second difference of more than `edge_ratio` of its largest value among
+   the neighbours has none, with probability `edge_missing_probability`, on both sides;
+5. range: beyond `max_range_m`, or no surface at all, is +inf; below `min_range_m` is NaN.
+
+A missing return is NaN. Every term has its switch. One normal and one uniform number is
+drawn per pixel and frame whatever the image and the switches, so that streams stay aligned.
+Left out: lateral noise, lens distortion, interference, motion blur, colour.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numba as nb
+import numpy as np
+
+from uavexp.errors import require, require_non_negative, require_positive
+from uavexp.geometry import rotation_from_quaternion
+from uavexp.scene import Scene
+from uavexp.types import Float, Float32, Scan, State
+
+
+@nb.njit(cache=True)
+def _aim(directions: Float32, origin_m: Float, rotation: Float, rays: Float32) -> None:
+    """Write rays (N, 6) of camera-frame directions (N, 3) from a pose to `rays`."""
+    for n in range(directions.shape[0]):
+        x, y, z = directions[n, 0], directions[n, 1], directions[n, 2]
+        for axis in range(3):
+            rays[n, axis] = origin_m[axis]
+            rays[n, 3 + axis] = rotation[axis, 0] * x + rotation[axis, 1] * y + rotation[axis, 2] * z
+
+
+@nb.njit(cache=True)
+def _measure(
+    true_depth_m: Float32,  # (H, W), inf on a miss
+    normal: Float32,  # (H * W, 3)
+    rays: Float32,  # (H * W, 6)
+    gaussian: Float32,  # (H, W)
+    uniform: Float32,  # (H, W)
+    min_range_m: float,
+    max_range_m: float,
+    axial_scale: float,
+    disparity_unit_m: float,  # f b / step; 0: not quantised
+    edge_ratio: float,
+    edge_probability: float,
+    least_cosine: float,
+) -> Float32:
+    """Measured depth (H, W) of a true one; see the module's list of terms."""
+    height, width = true_depth_m.shape
+    inverse = np.empty((height, width), dtype=np.float32)
+    for v in range(height):
+        for u in range(width):
+            inverse[v, u] = 1.0 / min(true_depth_m[v, u], max_range_m)
+    measured = np.empty((height, width), dtype=np.float32)
+    for v in range(height):
+        for u in range(width):
+            true = true_depth_m[v, u]
+            if uniform[v, u] < edge_probability and _at_edge(inverse, v, u, edge_ratio):
+                measured[v, u] = np.nan
+                continue
+            if not true < np.inf:
+                measured[v, u] = np.inf
+                continue
+            n = v * width + u
+            dx, dy, dz = rays[n, 3], rays[n, 4], rays[n, 5]
+            along = abs(normal[n, 0] * dx + normal[n, 1] * dy + normal[n, 2] * dz)
+            if along < least_cosine * math.sqrt(dx * dx + dy * dy + dz * dz):
+                measured[v, u] = np.nan
+                continue
+            depth = true + axial_scale * (0.0012 + 0.0019 * (true - 0.4) ** 2) * gaussian[v, u]
+            if depth >= min_range_m and disparity_unit_m > 0.0:
+                steps = np.floor(disparity_unit_m / depth + 0.5)
+                depth = disparity_unit_m / steps if steps > 0.0 else np.inf
+            if depth < min_range_m:
+                depth = np.nan
+            elif depth > max_range_m:
+                depth = np.inf
+            measured[v, u] = depth
+    return measured
+
+
+@nb.njit(cache=True)
+def _at_edge(inverse: Float32, v: int, u: int, ratio: float) -> bool:
+    """Whether inverse depth jumps at a pixel: its second difference along a row or column.
+
+    Inverse depth is linear over the image of a plane, however steep: a floor is no edge.
+    """
+    here = inverse[v, u]
+    if 0 < u < inverse.shape[1] - 1:
+        left, right = inverse[v, u - 1], inverse[v, u + 1]
+        if abs(left - 2.0 * here + right) > ratio * max(left, here, right):
+            return True
+    if 0 < v < inverse.shape[0] - 1:
+        above, below = inverse[v - 1, u], inverse[v + 1, u]
+        if abs(above - 2.0 * here + below) > ratio * max(above, here, below):
+            return True
+    return False
+
+
+@dataclass(slots=True, kw_only=True)
+class Rgbd:
+    """RGB-D depth camera with switchable noise terms."""
+
+    rate_hz: float = 20.0
+    width_px: int = 96
+    height_px: int = 72
+    horizontal_fov_deg: float = 90.0
+    min_range_m: float = 0.2
+    max_range_m: float = 5.0
+    mount_offset_m: Sequence[float] = (0.0, 0.0, 0.0)
+    mount_pitch_deg: float = 0.0
+    axial_noise: bool = True
+    quantisation: bool = True
+    baseline_m: float = 0.075
+    disparity_focal_px: float = 580.0
+    disparity_step_px: float = 0.125
+    edge_missing: bool = True
+    edge_ratio: float = 0.1
+    edge_missing_probability: float = 0.5
+    grazing_missing: bool = True
+    grazing_angle_deg: float = 80.0
+    _scene: Scene = field(init=False, repr=False)
+    _rng: np.random.Generator = field(init=False, repr=False)
+    _directions: Float32 = field(init=False, repr=False)
+    _rays: Float32 = field(init=False, repr=False)
+    _offset_m: Float = field(init=False, repr=False)
+    _body_from_camera: Float = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check every parameter."""
+        require_positive(
+            rate_hz=self.rate_hz,
+            max_range_m=self.max_range_m,
+            baseline_m=self.baseline_m,
+            disparity_focal_px=self.disparity_focal_px,
+            disparity_step_px=self.disparity_step_px,
+            edge_ratio=self.edge_ratio,
+        )
+        require_non_negative(min_range_m=self.min_range_m)
+        for name, size in (("width_px", self.width_px), ("height_px", self.height_px)):
+            whole = isinstance(size, int) and not isinstance(size, bool)
+            require(whole and 2 <= size <= 4096, f"{name} must be a whole number, 2 to 4096, got {size}")
+        require(
+            1.0 <= self.horizontal_fov_deg <= 170.0,
+            f"horizontal_fov_deg must be 1 to 170 deg, got {self.horizontal_fov_deg}",
+        )
+        require(
+            self.min_range_m < self.max_range_m,
+            f"min_range_m must be < max_range_m = {self.max_range_m}, got {self.min_range_m}",
+        )
+        require(
+            len(self.mount_offset_m) == 3 and all(math.isfinite(x) for x in self.mount_offset_m),
+            f"mount_offset_m must be three finite numbers [x, y, z], got {list(self.mount_offset_m)}",
+        )
+        require(
+            -90.0 <= self.mount_pitch_deg <= 90.0,
+            f"mount_pitch_deg must be -90 to 90 deg, got {self.mount_pitch_deg}",
+        )
+        require(
+            0.0 <= self.edge_missing_probability <= 1.0,
+            f"edge_missing_probability must be 0 to 1, got {self.edge_missing_probability}",
+        )
+        require(
+            0.0 < self.grazing_angle_deg <= 90.0,
+            f"grazing_angle_deg must be > 0 and <= 90 deg, got {self.grazing_angle_deg}",
+        )
+
+    @property
+    def focal_px(self) -> float:
+        """Focal length of the square pixels, px; the field of view ends at the outer pixel edges."""
+        return 0.5 * self.width_px / math.tan(math.radians(0.5 * self.horizontal_fov_deg))
+
+    @property
+    def centre_px(self) -> tuple[float, float]:
+        """Optical axis, px; pixel (0, 0) has its centre at (0, 0)."""
+        return 0.5 * (self.width_px - 1), 0.5 * (self.height_px - 1)
+
+    def reset(self, scene: Scene, rng: np.random.Generator) -> None:
+        """Begin a trial in `scene`, drawing noise from `rng`."""
+        self._scene, self._rng = scene, rng
+        cx, cy = self.centre_px
+        u, v = np.meshgrid(np.arange(self.width_px), np.arange(self.height_px))
+        # z = 1: the ray parameter is the depth along the optical axis
+        grid = np.stack([(u - cx) / self.focal_px, (v - cy) / self.focal_px, np.ones_like(u)], axis=-1)
+        self._directions = grid.reshape(-1, 3).astype(np.float32)
+        self._rays = np.empty((self._directions.shape[0], 6), dtype=np.float32)
+        self._offset_m = np.array([float(x) for x in self.mount_offset_m])
+        pitch = math.radians(self.mount_pitch_deg)
+        forward = np.array([math.cos(pitch), 0.0, math.sin(pitch)])
+        down = np.array([math.sin(pitch), 0.0, -math.cos(pitch)])
+        self._body_from_camera = np.stack([np.array([0.0, -1.0, 0.0]), down, forward], axis=1)
+
+    def capture(self, true_state: State, estimated_state: State, time_s: float) -> Scan:
+        """Measure from the true pose; the scan carries the pose believed (estimated)."""
+        position, rotation = self._camera_pose(true_state)
+        _aim(self._directions, position, rotation, self._rays)
+        hit, normal = self._scene.cast(self._rays)
+        shape = (self.height_px, self.width_px)
+        believed_position, believed_rotation = self._camera_pose(estimated_state)
+        unit = self.disparity_focal_px * self.baseline_m / self.disparity_step_px
+        depth = _measure(
+            hit.reshape(shape),
+            normal,
+            self._rays,
+            self._rng.standard_normal(shape, dtype=np.float32),
+            self._rng.random(shape, dtype=np.float32),
+            float(self.min_range_m),
+            float(self.max_range_m),
+            1.0 if self.axial_noise else 0.0,
+            unit if self.quantisation else 0.0,
+            float(self.edge_ratio),
+            float(self.edge_missing_probability) if self.edge_missing else 0.0,
+            math.cos(math.radians(self.grazing_angle_deg)) if self.grazing_missing else 0.0,
+        )
+        return Scan(
+            time_s=time_s,
+            depth_m=depth,
+            focal_px=(self.focal_px, self.focal_px),
+            centre_px=self.centre_px,
+            max_range_m=self.max_range_m,
+            camera_position_m=believed_position,
+            camera_rotation=believed_rotation,
+        )
+
+    def _camera_pose(self, state: State) -> tuple[Float, Float]:
+        """World position (3,) and camera-to-world rotation (3, 3) of the camera."""
+        body = rotation_from_quaternion(state.quaternion_wxyz)
+        return state.position_m + body @ self._offset_m, body @ self._body_from_camera

@@ -1,0 +1,233 @@
+"""The closed loop: sense, map, choose a goal, decide whether to replan, plan, control, fly."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from uavexp.controller.base import Controller
+from uavexp.errors import require, require_non_negative, require_positive
+from uavexp.estimator.base import Estimator
+from uavexp.explorer.base import Explorer
+from uavexp.geometry import quaternion_from_yaw
+from uavexp.mapping.base import MapBackend
+from uavexp.mission.base import Mission
+from uavexp.pilot import Pilot
+from uavexp.planner.base import Planner
+from uavexp.recorder import Recorder, Stopwatch, seen_share
+from uavexp.safety.base import Safety
+from uavexp.scene import Scene
+from uavexp.seeding import Stream, generator
+from uavexp.sensor.base import Sensor
+from uavexp.trigger.base import TriggerPolicy
+from uavexp.types import MapUpdate, Observation, Outcome, Reference, State, TrialLog, World
+from uavexp.vehicle.base import Vehicle
+from uavexp.vehicle.contact import ContactTracker
+from uavexp.world.base import WorldGenerator
+
+Progress = Callable[[float, str], None]  # simulated time s, a few words
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parts:
+    """One component per role and the few numbers that belong to no role."""
+
+    world: WorldGenerator
+    sensor: Sensor
+    estimator: Estimator
+    mapping: MapBackend
+    explorer: Explorer
+    trigger: TriggerPolicy
+    planner: Planner
+    controller: Controller
+    vehicle: Vehicle
+    safety: Safety
+    mission: Mission
+    step_s: float = 0.01
+    latency_s: float = 0.03
+    start_bubble_m: float = 0.6
+    restart_error_m: float = 0.4
+    stuck_s: float = 20.0
+    yaw_lookahead_s: float = 0.8
+
+    def __post_init__(self) -> None:
+        require_positive(step_s=self.step_s, restart_error_m=self.restart_error_m, stuck_s=self.stuck_s)
+        require_non_negative(
+            latency_s=self.latency_s,
+            start_bubble_m=self.start_bubble_m,
+            yaw_lookahead_s=self.yaw_lookahead_s,
+        )
+        steps_per(self.step_s, "latency_s", self.latency_s)
+        for name, rate_hz in self.rates_hz().items():
+            steps_per(self.step_s, f"1 / {name}", 1.0 / rate_hz)
+
+    def rates_hz(self) -> dict[str, float]:
+        """The rates of all roles that have one."""
+        return {
+            "sensor.rate_hz": self.sensor.rate_hz,
+            "mapping.esdf_rate_hz": self.mapping.esdf_rate_hz,
+            "explorer.rate_hz": self.explorer.rate_hz,
+            "controller.rate_hz": self.controller.rate_hz,
+        }
+
+
+def steps_per(step_s: float, name: str, duration_s: float) -> int:
+    """Number of steps in a duration; raise `ConfigError` unless it is a whole number."""
+    steps = round(duration_s / step_s)
+    exact = math.isclose(steps * step_s, duration_s, rel_tol=1e-9, abs_tol=1e-12)
+    require(exact, f"{name} = {duration_s:g} s must be a whole multiple of step_s = {step_s:g} s")
+    return steps
+
+
+def fly_trial(parts: Parts, seed: int, progress: Progress | None = None) -> tuple[World, TrialLog]:
+    """Draw the seed's world and fly one trial in it.
+
+    Args:
+        parts: freshly built components.
+        seed: the trial's seed, >= 0.
+        progress: called about once a simulated second.
+
+    Returns:
+        The world and the log of the flight.
+
+    Raises:
+        WorldError: when the world cannot be made.
+    """
+    world = parts.world.generate(generator(seed, Stream.WORLD))
+    return world, fly(parts, world, seed, progress)
+
+
+def fly(parts: Parts, world: World, seed: int, progress: Progress | None = None) -> TrialLog:
+    """Fly one trial in a given world; every rate is a whole number of steps (see `Parts`)."""
+    scene = Scene(world)
+    watch, recorder = Stopwatch(), Recorder()
+    estimate = state = _hover(world)
+    contact = ContactTracker(scene=scene, body_size_m=parts.vehicle.limits.body_size_m)
+    pilot = _reset(parts, world, scene, state, seed, watch)
+    period = {name: steps_per(parts.step_s, name, 1.0 / rate) for name, rate in parts.rates_hz().items()}
+    last_step = math.ceil(parts.mission.time_limit_s / parts.step_s)
+    stuck_steps = math.ceil(parts.stuck_s / parts.step_s)
+    outcome: Outcome | None = None
+
+    for step in range(last_step + 1):
+        time_s = step * parts.step_s
+        if step % period["sensor.rate_hz"] == 0:
+            with watch.lap("sense"):
+                scan = parts.sensor.capture(state, estimate, time_s)
+            with watch.lap("integrate"):
+                parts.mapping.integrate(scan)
+        reference = pilot.reference(time_s, parts.step_s)
+        if step % period["mapping.esdf_rate_hz"] == 0:
+            with watch.lap("esdf"):
+                update = parts.mapping.update(time_s)
+        observation = _observe(parts, pilot, time_s, estimate, reference, update)
+        if step % period["explorer.rate_hz"] == 0:
+            pilot.explore(observation)
+            observation = _observe(parts, pilot, time_s, estimate, reference, update)
+        if step % period["mapping.esdf_rate_hz"] == 0:
+            recorder.tick(observation, pilot.decide(observation))
+        if step % period["controller.rate_hz"] == 0:
+            with watch.lap("control"):
+                command = parts.controller.command(estimate, reference)
+        recorder.step(time_s, state, estimate, reference)
+        outcome = parts.mission.outcome(state.position_m, observation)
+        if outcome is None and step % 100 == 0 and recorder.moved_m(stuck_steps) < 0.3:
+            outcome = Outcome.STUCK if pilot.ever_planned else Outcome.NO_PLAN
+        if outcome is not None:
+            break
+        with watch.lap("vehicle"):
+            moved = parts.vehicle.step(command, parts.step_s)
+            state, touched = contact.advance(state, moved, time_s + parts.step_s)
+            if touched:
+                parts.vehicle.place(state)
+        estimate = parts.estimator.estimate(state, parts.step_s)
+        if progress is not None and step % 100 == 0:
+            progress(time_s, f"{len(pilot.replans)} plans")
+    return _log(parts, world, scene, pilot, recorder, contact, outcome or Outcome.TIMEOUT, watch)
+
+
+def _hover(world: World) -> State:
+    return State(
+        position_m=world.start_m.copy(),
+        velocity_mps=np.zeros(3),
+        quaternion_wxyz=quaternion_from_yaw(world.start_yaw_rad),
+        body_rate_radps=np.zeros(3),
+    )
+
+
+def _reset(parts: Parts, world: World, scene: Scene, start: State, seed: int, watch: Stopwatch) -> Pilot:
+    """Give every part its trial's context and its own random stream."""
+    limits = parts.vehicle.limits
+    parts.sensor.reset(scene, generator(seed, Stream.SENSOR))
+    parts.estimator.reset(generator(seed, Stream.ESTIMATOR))
+    parts.mapping.reset(world.bounds_m)
+    parts.mapping.mark_free(world.start_m, parts.start_bubble_m)
+    parts.explorer.reset(float(world.start_m[2]), limits)
+    parts.trigger.reset(limits)
+    parts.planner.reset(limits, generator(seed, Stream.PLANNER))
+    parts.controller.reset(limits, parts.vehicle.mass_kg)
+    parts.vehicle.reset(start)
+    parts.safety.reset(limits)
+    parts.mission.reset(world)
+    return Pilot(
+        explorer=parts.explorer,
+        trigger=parts.trigger,
+        planner=parts.planner,
+        safety=parts.safety,
+        limits=limits,
+        watch=watch,
+        latency_s=parts.latency_s,
+        restart_error_m=parts.restart_error_m,
+        yaw_lookahead_s=parts.yaw_lookahead_s,
+        yaw_rate_radps=0.9 * limits.max_body_rate_radps,
+        flight_bounds_m=world.flight_bounds_m,
+        hover_m=world.start_m.copy(),
+        yaw_rad=world.start_yaw_rad,
+    )
+
+
+def _observe(
+    parts: Parts, pilot: Pilot, time_s: float, estimate: State, reference: Reference, update: MapUpdate
+) -> Observation:
+    return Observation(
+        time_s=time_s,
+        state=estimate,
+        reference=reference,
+        trajectory=pilot.trajectory,
+        field=parts.mapping.field,
+        update=update,
+        goal=pilot.goal,
+        best_goal=pilot.best_goal,
+        target_m=parts.mission.target_m,
+        flight_bounds_m=pilot.flight_bounds_m,
+    )
+
+
+def _log(
+    parts: Parts,
+    world: World,
+    scene: Scene,
+    pilot: Pilot,
+    recorder: Recorder,
+    contact: ContactTracker,
+    outcome: Outcome,
+    watch: Stopwatch,
+) -> TrialLog:
+    exploring = parts.mission.target_m is None
+    return recorder.log(
+        outcome=outcome,
+        reason="" if outcome in (Outcome.REACHED, Outcome.EXPLORED) else pilot.failure,
+        step_s=parts.step_s,
+        scene=scene,
+        field=parts.mapping.field,
+        replans=tuple(pilot.replans),
+        dropped_triggers=pilot.dropped_triggers,
+        contacts=contact.contacts,
+        seen_share=seen_share(world, scene, parts.mapping.field, parts.vehicle.limits)
+        if exploring
+        else math.nan,
+        watch=watch,
+    )

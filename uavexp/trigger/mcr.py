@@ -1,0 +1,222 @@
+"""Map-change-driven replanning (paper 1, §3.4): replan on a map event or a goal event.
+
+Equation (20): a map event is some x within r_mon of the trajectory with
+
+    |d_t(x) - d_{t-1}(x)| > delta_map
+
+and a goal event is ||g*_t - g*_{t-1}|| > delta_g. Read literally, the first fires at most
+checks while anything new is in view. §3.4 calls it a "planning validity violation" and a
+"contraction of the local free-space boundary", §4.5 speaks of "accumulated structural map
+variations rather than instantaneous measurements". So every part of the reading is a
+parameter. `judge: region` is the equation; `judge: path` (the default) asks the same of
+the trajectory's own points: the clearance there has dropped by more than delta_map since
+the plan was made, to below `valid_clearance_m`, at a point reached within `horizon_s`.
+A plan whose room has not shrunk is valid however much the map changes beside it; a change
+further ahead keeps accumulating until it matters, and is then answered by one replan.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import numpy as np
+
+from uavexp.errors import require, require_non_negative, require_option, require_positive
+from uavexp.geometry import evaluate, sample_times
+from uavexp.mapping.base import DistanceField
+from uavexp.trigger.change import changed_near
+from uavexp.types import Decision, Float, Goal, Int32, Limits, Observation, Trajectory
+
+_SAMPLE_S = 0.05  # at 2.5 m/s about one voxel apart
+
+
+class Judge(StrEnum):
+    """Where a change is judged."""
+
+    PATH = "path"  # at the trajectory's own points
+    REGION = "region"  # anywhere within the monitoring radius
+
+
+class Since(StrEnum):
+    """What a change is measured against."""
+
+    PLAN = "plan"  # the field on which the plan was made
+    UPDATE = "update"  # the previous ESDF update
+
+
+class Extent(StrEnum):
+    """Which part of the trajectory is monitored."""
+
+    REMAINING = "remaining"
+    WHOLE = "whole"
+
+
+class FirstSight(StrEnum):
+    """Which voxels seen for the first time count as changed."""
+
+    NONE = "none"
+    OCCUPIED = "occupied"
+    ALL = "all"
+
+
+class Sign(StrEnum):
+    """Which changes of distance count."""
+
+    CONTRACTION = "contraction"
+    BOTH = "both"
+
+
+_NO_VOXELS = np.zeros(0, dtype=np.int32)
+
+
+@dataclass(slots=True, kw_only=True)
+class Mcr:
+    """The MCR policy; every reading of the paper is a parameter."""
+
+    delta_map_m: float = 0.15
+    delta_goal_m: float = 0.3
+    monitor_radius_m: float = 2.0
+    judge: Judge = Judge.PATH
+    since: Since = Since.PLAN
+    goal_since: Since = Since.PLAN
+    extent: Extent = Extent.REMAINING
+    first_sight: FirstSight = FirstSight.OCCUPIED
+    sign: Sign = Sign.CONTRACTION
+    min_changed_voxels: int = 1
+    valid_clearance_m: float = 0.4
+    horizon_s: float = 2.0
+    min_interval_s: float = 0.0
+    _trajectory: Trajectory | None = field(init=False, repr=False, default=None)
+    _at_plan: DistanceField | None = field(init=False, repr=False, default=None)
+    _planned_s: float = field(init=False, repr=False, default=-math.inf)
+    _points_m: Float = field(init=False, repr=False, default_factory=lambda: np.zeros((0, 3)))
+    _times_s: Float = field(init=False, repr=False, default_factory=lambda: np.zeros(0))
+    _clearance_m: Float = field(init=False, repr=False, default_factory=lambda: np.zeros(0))
+    _previous_goal: Goal | None = field(init=False, repr=False, default=None)
+
+    def __post_init__(self) -> None:
+        self.judge = require_option("judge", self.judge, Judge)
+        self.since = require_option("since", self.since, Since)
+        self.goal_since = require_option("goal_since", self.goal_since, Since)
+        self.extent = require_option("extent", self.extent, Extent)
+        self.first_sight = require_option("first_sight", self.first_sight, FirstSight)
+        self.sign = require_option("sign", self.sign, Sign)
+        require_positive(
+            delta_map_m=self.delta_map_m,
+            delta_goal_m=self.delta_goal_m,
+            monitor_radius_m=self.monitor_radius_m,
+            valid_clearance_m=self.valid_clearance_m,
+            horizon_s=self.horizon_s,
+        )
+        require_non_negative(min_interval_s=self.min_interval_s)
+        require(
+            self.min_changed_voxels >= 1, f"min_changed_voxels must be >= 1, got {self.min_changed_voxels}"
+        )
+
+    def reset(self, limits: Limits) -> None:
+        """Begin a trial."""
+        self._trajectory, self._at_plan, self._previous_goal = None, None, None
+        self._planned_s = -math.inf
+
+    def planned(self, trajectory: Trajectory, field: DistanceField) -> None:
+        """Keep the new plan and its clearance on the map that it was made on."""
+        self._trajectory = trajectory
+        self._planned_s = trajectory.start_s
+        self._times_s = sample_times(trajectory, trajectory.start_s, _SAMPLE_S)
+        self._points_m = evaluate(trajectory, self._times_s)[0]
+        self._clearance_m = field.distance_m(self._points_m)
+        if self.since is Since.PLAN:
+            self._at_plan = field.copy()
+
+    def decide(self, observation: Observation) -> Decision:
+        """Return the map event, else the goal event, else no."""
+        goal_drift_m = self._goal_drift_m(observation)
+        self._previous_goal = observation.best_goal
+        if self._trajectory is None or observation.time_s - self._planned_s < self.min_interval_s:
+            return Decision(replan=False)
+        decision = (
+            self._path_event(observation) if self.judge is Judge.PATH else self._region_event(observation)
+        )
+        if decision.replan or goal_drift_m <= self.delta_goal_m:
+            return decision
+        return Decision(replan=True, cause="goal", score=goal_drift_m / self.delta_goal_m)
+
+    def _goal_drift_m(self, observation: Observation) -> float:
+        """Distance between g* now and the goal flown to (or g* at the previous check)."""
+        before = observation.goal if self.goal_since is Since.PLAN else self._previous_goal
+        if observation.best_goal is None or before is None:
+            return 0.0
+        return float(np.linalg.norm(observation.best_goal.position_m - before.position_m))
+
+    def _monitored(self, now_s: float) -> slice:
+        if self.extent is Extent.WHOLE:
+            return slice(None)
+        return slice(int(np.searchsorted(self._times_s, now_s)), None)
+
+    def _path_event(self, observation: Observation) -> Decision:
+        """Clearance at the trajectory's points: dropped since the plan, low, and soon."""
+        part = self._monitored(observation.time_s)
+        now_m = observation.field.distance_m(self._points_m[part])
+        change_m = self._clearance_m[part] - now_m
+        if self.since is Since.UPDATE:
+            self._clearance_m[part] = now_m
+        size_m = np.abs(change_m) if self.sign is Sign.BOTH else change_m
+        soon = self._times_s[part] - observation.time_s <= self.horizon_s
+        violated = (size_m > self.delta_map_m) & (now_m < self.valid_clearance_m) & soon
+        score = float(size_m[soon].max(initial=0.0)) / self.delta_map_m
+        if not violated.any():
+            return Decision(replan=False, score=score)
+        voxel, _ = self._changed(observation, self._points_m[part][violated])
+        return Decision(replan=True, cause="map", score=score, voxel=voxel)
+
+    def _region_event(self, observation: Observation) -> Decision:
+        """Equation (20) over the voxels of B(tau)."""
+        voxel, largest_m = self._changed(observation, self._points_m[self._monitored(observation.time_s)])
+        score = largest_m / self.delta_map_m
+        if len(voxel) < self.min_changed_voxels:
+            return Decision(replan=False, score=score)
+        return Decision(replan=True, cause="map", score=score, voxel=voxel)
+
+    def _changed(self, observation: Observation, points_m: Float) -> tuple[Int32, float]:
+        """Voxels within r_mon of the points that changed by more than delta_map, and the largest change."""
+        if len(points_m) == 0:
+            return _NO_VOXELS, 0.0
+        update, now = observation.update, observation.field
+        if self.since is Since.UPDATE or self._at_plan is None:
+            counted = ~update.first_seen
+            if self.first_sight is FirstSight.ALL:
+                counted = np.ones_like(counted)
+            elif self.first_sight is FirstSight.OCCUPIED:
+                counted |= update.occupied
+            voxel = update.voxel[counted]
+            old, new = update.old_distance_m[counted], update.new_distance_m[counted]
+        else:
+            voxel, old, new = self._since_plan(now)
+        both = self.sign is Sign.BOTH
+        near, largest_m = changed_near(
+            voxel,
+            old,
+            new,
+            np.array(now.distance.shape),
+            now.origin_m,
+            now.voxel_size_m,
+            points_m,
+            self.monitor_radius_m,
+            self.delta_map_m,
+            both,
+        )
+        return near, largest_m
+
+    def _since_plan(self, now: DistanceField) -> tuple[Int32, np.ndarray, np.ndarray]:
+        """Voxels whose distance differs from that at the plan; first sights as configured."""
+        assert self._at_plan is not None
+        differs = now.distance != self._at_plan.distance
+        if self.first_sight is not FirstSight.ALL:
+            counted = self._at_plan.state != 0
+            if self.first_sight is FirstSight.OCCUPIED:
+                counted = counted | (now.state == 2)
+            differs &= counted
+        voxel = np.flatnonzero(differs).astype(np.int32)
+        return voxel, self._at_plan.distance.ravel()[voxel], now.distance.ravel()[voxel]

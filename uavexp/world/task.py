@@ -1,0 +1,162 @@
+"""The task in a world: whether start and target are joined, how far apart, how hard.
+
+Everything is measured on the true triangles. "Joined with a clearance" is proved, not
+sampled (`lattice`): a found path keeps the clearance all along, ends included.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+
+import numpy as np
+from scipy import ndimage
+
+from uavexp.errors import WorldError
+from uavexp.geometry import polyline_length_m
+from uavexp.scene import Scene
+from uavexp.types import Bool, Difficulty, Float, Float32, Int32, World
+from uavexp.world import lattice
+
+CELL_M = 0.1  # spacing of the lattice on which the shortest path is exact
+LAYER_CELL_M = 0.2  # spacing of the layer from which start and target are drawn
+MAX_KNOTS = 120  # points of a path that is being tightened
+MIN_KNOT_STEP_M = 0.2
+TIGHTEN_ROUNDS = 3
+GAP_STEP_M = 0.02  # between the points where the clearance of the path is measured
+BOTTLENECK_STEP_M = 0.01
+
+
+def shortest_path(
+    scene: Scene, flight_bounds_m: Float, start_m: Float, target_m: Float, clearance_m: float
+) -> Float:
+    """Shortest known path (P, 3) that keeps `clearance_m` from every surface.
+
+    The exact shortest 26-connected path on a 0.1 m lattice, pulled tight by lines of sight:
+    an upper bound of the true shortest length, in practice within about 1 % of it.
+
+    Returns:
+        The path, ends included; (0, 3) when the two are not joined.
+    """
+    shape = lattice.shape_of(flight_bounds_m, CELL_M)
+    radius = lattice.proof_radius_m(clearance_m, math.sqrt(3.0) * CELL_M)
+    path = lattice.shortest_path(
+        scene.grid, flight_bounds_m[0], CELL_M, shape, radius, clearance_m, start_m, target_m
+    )
+    if path.shape[0] == 0:
+        return path
+    path = lattice.skip_ahead(scene.grid, path, clearance_m)
+    for _ in range(TIGHTEN_ROUNDS):
+        path = lattice.tighten(scene.grid, _knots(path), clearance_m)
+    return path
+
+
+def _knots(path_m: Float) -> Float:
+    """The path's own points and more between them, so that tightening can move its corners."""
+    step = max(MIN_KNOT_STEP_M, polyline_length_m(path_m) / MAX_KNOTS)
+    pieces = [path_m[:1]]
+    for a, b in zip(path_m[:-1], path_m[1:], strict=True):
+        count = max(1, math.ceil(float(np.linalg.norm(b - a)) / step))
+        pieces.append(a + (b - a) * (np.arange(1, count + 1) / count)[:, None])
+    return np.concatenate(pieces)
+
+
+def bottleneck_m(scene: Scene, flight_bounds_m: Float, start_m: Float, target_m: Float, below_m: float) -> float:
+    """Largest clearance, to 1 cm and under `below_m`, at which start and target are joined; 0 if none."""
+    low, high = 0, math.ceil(below_m / BOTTLENECK_STEP_M)
+    while high - low > 1:
+        middle = (low + high) // 2
+        joined = shortest_path(
+            scene, flight_bounds_m, start_m, target_m, middle * BOTTLENECK_STEP_M
+        ).shape[0]
+        low, high = (middle, high) if joined else (low, middle)
+    return low * BOTTLENECK_STEP_M
+
+
+def free_layer(
+    scene: Scene, flight_bounds_m: Float, height_m: float, clearance_m: float
+) -> tuple[Float, Int32, Int32]:
+    """Points at one height that keep `clearance_m`, and which of them are joined in that plane.
+
+    Returns:
+        Points (N, 3), the number (N,) of each one's connected part from 0, and the parts'
+        sizes in points.
+    """
+    shape = lattice.shape_of(flight_bounds_m, LAYER_CELL_M)
+    radius = lattice.proof_radius_m(clearance_m, math.sqrt(2.0) * LAYER_CELL_M)
+    free = lattice.passable_layer(scene.grid, flight_bounds_m[0], LAYER_CELL_M, shape, height_m, radius)
+    labels = np.asarray(ndimage.label(free, structure=np.ones((3, 3)))[0], dtype=np.int32)
+    index = np.argwhere(free)
+    points = np.column_stack(
+        [flight_bounds_m[0, :2] + (index + 0.5) * LAYER_CELL_M, np.full(index.shape[0], height_m)]
+    )
+    part = labels[free] - 1
+    return points, part, np.bincount(part).astype(np.int32)
+
+
+def clutter_density(scene: Scene, flight_bounds_m: Float, start_m: Float) -> float:
+    """Share of the layer at the start's height that air around the start does not fill.
+
+    A 0.1 m cell is air when no surface is nearer to its centre than half a cell, and when
+    air cells join it with the start; so the inside of a closed solid counts as occupied,
+    whether the mesh has an inside or not.
+    """
+    shape = lattice.shape_of(flight_bounds_m, CELL_M)
+    air: Bool = lattice.passable_layer(
+        scene.grid, flight_bounds_m[0], CELL_M, shape, start_m[2], 0.5 * CELL_M
+    )
+    labels = ndimage.label(air)[0]
+    i, j = np.minimum(((start_m[:2] - flight_bounds_m[0, :2]) / CELL_M).astype(int), shape[:2] - 1)
+    return 1.0 - float(np.count_nonzero(labels == labels[i, j])) / air.size if air[i, j] else 1.0
+
+
+def narrowest_gap_m(scene: Scene, path_m: Float) -> float:
+    """Twice the smallest distance between the path (P, 3) and any surface, m."""
+    length = polyline_length_m(path_m)
+    count = max(2, math.ceil(length / GAP_STEP_M))
+    at = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path_m, axis=0), axis=1))])
+    along = np.linspace(0.0, at[-1], count)
+    points = np.column_stack([np.interp(along, at, path_m[:, axis]) for axis in range(3)])
+    return 2.0 * float(scene.distance_m(points).min())
+
+
+def assemble(
+    *,
+    name: str,
+    scene: Scene,
+    vertices_m: Float32,
+    triangles: Int32,
+    bounds_m: Float,
+    flight_bounds_m: Float,
+    path_m: Float,
+) -> World:
+    """Return the world of a geometry and the shortest path in it (from which start and target come).
+
+    The start yaw is the bearing of the target, not the direction of the path, which the
+    vehicle cannot know.
+    """
+    start, target = path_m[0], path_m[-1]
+    yaw = math.atan2(target[1] - start[1], target[0] - start[0])
+    difficulty = Difficulty(
+        clutter_density=clutter_density(scene, flight_bounds_m, start),
+        narrowest_gap_m=narrowest_gap_m(scene, path_m),
+        straight_line_m=float(np.linalg.norm(target - start)),
+        shortest_path_m=polyline_length_m(path_m),
+    )
+    digest = hashlib.sha256()
+    for array in (vertices_m, triangles, bounds_m, flight_bounds_m, start, target):
+        digest.update(str(array.shape).encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return World(
+        name=name,
+        vertices_m=vertices_m,
+        triangles=triangles,
+        bounds_m=bounds_m,
+        flight_bounds_m=flight_bounds_m,
+        start_m=start.copy(),
+        start_yaw_rad=yaw,
+        target_m=target.copy(),
+        shortest_path=path_m,
+        difficulty=difficulty,
+        digest=digest.hexdigest(),
+    )
