@@ -9,6 +9,7 @@ is called.
 from __future__ import annotations
 
 import importlib
+import inspect
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -50,14 +51,12 @@ def check_config(config: Mapping[str, Any], options: Mapping[str, str]) -> dict[
         ConfigError: a wrong class, an unknown or missing parameter, a wrong type; every
             constructor has accepted its values when this returns.
     """
-    checked: dict[str, Any] = {}
+    checked: dict[str, Any] = {key: check_value(key, config[key], float) for key in TOP_LEVEL}
     for group in GROUPS:
         tree = config[group]
         if not isinstance(tree, Mapping) or TARGET not in tree:
             raise ConfigError(f"{group}={options[group]}: the option has no {TARGET}")
         checked[group] = {TARGET: tree[TARGET], **plain(_arguments(group, tree))}
-    for key in TOP_LEVEL:
-        checked[key] = check_value(key, config[key], float)
     build(checked)
     return checked
 
@@ -86,15 +85,25 @@ def build_component(group: str, tree: Mapping[str, Any]) -> Any:
     try:
         component = cls(**_arguments(group, tree))
     except UavexpError as error:
-        raise ConfigError(f"{group}.{error}") from error
+        about_parameter = str(error).split(" ")[0] in parameter_types(cls)
+        raise ConfigError(f"{group}{'.' if about_parameter else ': '}{error}") from error
     except (TypeError, ValueError, ArithmeticError) as error:
         raise ConfigError(f"{group}: {cls.__name__} cannot be made: {error}") from error
-    lacking = [name for name in protocol_members(group) if not hasattr(component, name)]
+    lacking = [name for name in protocol_members(group) if not _has(component, name)]
     if lacking:
         raise ConfigError(
             f"{group}: {cls.__module__}.{cls.__name__} is no {group}, it lacks {', '.join(lacking)}"
         )
     return component
+
+
+def _has(component: object, name: str) -> bool:
+    """Whether an attribute exists; properties are not called, they may need `reset` first."""
+    try:
+        inspect.getattr_static(component, name)
+    except AttributeError:
+        return False
+    return True
 
 
 def component_class(group: str, target: str) -> type:

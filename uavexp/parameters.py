@@ -8,7 +8,7 @@ import inspect
 import math
 import types
 import typing
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from enum import Enum
 from typing import Any, Literal, Union, get_args, get_origin
 
@@ -57,7 +57,7 @@ def describe(annotation: Any) -> str:
         return " or ".join(describe(item) for item in arguments)
     if origin is Literal:
         return " | ".join(map(str, arguments))
-    if origin is list:
+    if origin in (list, Sequence):
         return f"a list, each {describe(arguments[0])}"
     if origin is tuple:
         if arguments[-1] is Ellipsis:
@@ -88,7 +88,7 @@ def _convert(value: Any, annotation: Any) -> Any:
         return _convert_union(value, arguments)
     if origin is Literal:
         return _member(value, value in arguments)
-    if origin is list:
+    if origin in (list, Sequence):
         return [_convert(item, arguments[0]) for item in _sequence(value)]
     if origin is tuple:
         return _convert_tuple(_sequence(value), arguments)

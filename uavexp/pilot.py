@@ -36,6 +36,7 @@ from uavexp.types import (
 )
 
 _GOALS_PER_REQUEST = 3  # so many goals are tried before the vehicle brakes [ours]
+_LOOK_RADPS = 0.8  # [ours]
 _SAMPLE_S = 0.1  # spacing of the samples kept of a trajectory
 
 
@@ -82,11 +83,10 @@ class Pilot:
         """What to follow now; adopts a plan whose time has come and turns the yaw."""
         if self._pending is not None and time_s >= self._pending.trajectory.start_s - 1e-9:
             self.trajectory, self.goal, self._pending = self._pending.trajectory, self._pending.goal, None
+        if self.failure and not self._moving(time_s):
+            return self._look_around(step_s)
         if self.trajectory is None:
-            zero = np.zeros(3)
-            return Reference(
-                position_m=self.hover_m, velocity_mps=zero, acceleration_mps2=zero, yaw_rad=self.yaw_rad
-            )
+            return self._hold(self.hover_m)
         ahead_s = min(time_s + self.yaw_lookahead_s, max(time_s, self.trajectory.end_s))
         position, velocity, acceleration = evaluate(self.trajectory, np.array([time_s, ahead_s]))
         rate_radps = self._turn(position[1] - position[0], step_s)
@@ -97,6 +97,21 @@ class Pilot:
             yaw_rad=self.yaw_rad,
             yaw_rate_radps=rate_radps,
         )
+
+    def _hold(self, position_m: Float, yaw_rate_radps: float = 0.0) -> Reference:
+        zero = np.zeros(3)
+        return Reference(
+            position_m=position_m,
+            velocity_mps=zero,
+            acceleration_mps2=zero,
+            yaw_rad=self.yaw_rad,
+            yaw_rate_radps=yaw_rate_radps,
+        )
+
+    def _look_around(self, step_s: float) -> Reference:
+        """Hold and turn: without a plan, only new sights can help."""
+        self.yaw_rad = wrap_angle(self.yaw_rad + _LOOK_RADPS * step_s)
+        return self._hold(self._planned_state(math.inf)[0], _LOOK_RADPS)
 
     def _turn(self, ahead_m: Float, step_s: float) -> float:
         """Turn the yaw towards the path ahead; return the rate, rad/s."""

@@ -44,7 +44,7 @@ def check_trust(tree: Any) -> None:
         if not (isinstance(value, str) and _DOTTED_NAME.fullmatch(value) and is_trusted(value)):
             raise ConfigError(
                 f"{key}={value!r} is refused: a configuration may only name classes of "
-                f"{', '.join(trusted_packages())} (add your own package to the environment variable {VARIABLE})"
+                f"{', '.join(trusted_packages())}; add packages to the variable {VARIABLE}"
             )
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from uavexp.build import GROUPS, TOP_LEVEL, check_config
-from uavexp.cli.options import EXPERIMENT_GROUP, PRESET_GROUP, list_options
+from uavexp.cli.options import EXPERIMENT_GROUP, PRESET_GROUP, list_options, read_option
 from uavexp.cli.overrides import Setting, expand_grid, expand_seeds, quoted
 from uavexp.errors import ConfigError
 from uavexp.parameters import nearest
@@ -67,10 +67,11 @@ class Composer:
         """
         ours = {setting.key: setting for setting in settings if setting.key in ("seed", "out")}
         grid = expand_grid([setting for setting in settings if setting.key not in ours])
+        seeds = expand_seeds(ours["seed"].values) if "seed" in ours else ()
+        defaults = self.compose(grid[0])
+        seeds = seeds or expand_seeds([defaults["seed"]])
         cells = tuple(self.cell(settings) for settings in grid)
         _refuse_equal_cells(cells)
-        defaults = self.compose(grid[0])
-        seeds = expand_seeds(ours["seed"].values if "seed" in ours else [defaults["seed"]])
         out = ours["out"].values if "out" in ours else (defaults["out"],)
         if len(out) != 1 or not isinstance(out[0], str | None) or out[0] == "":
             raise ConfigError(f"out must be one folder, got {', '.join(map(repr, out))}")
@@ -144,12 +145,14 @@ class Composer:
         return tree
 
     def _hydra_tree(self, arguments: list[str]) -> dict[str, Any]:
-        import yaml
+        import yaml  # type: ignore[import-untyped]
         from hydra import compose, initialize_config_dir
         from hydra.core.global_hydra import GlobalHydra
         from hydra.errors import HydraException
         from omegaconf import OmegaConf
         from omegaconf.errors import OmegaConfBaseException
+
+        bad_input = (HydraException, OmegaConfBaseException, yaml.YAMLError, OSError, ValueError, KeyError)
 
         if self.user_folder is not None:
             arguments = [*arguments, f"hydra.searchpath=[{_file_url(self.user_folder)}]"]
@@ -162,14 +165,7 @@ class Composer:
                 warnings.simplefilter("ignore")
                 composed = compose(CONFIG_NAME, overrides=arguments, return_hydra_config=True)
             tree: Any = OmegaConf.to_container(composed, resolve=False)
-        except (
-            HydraException,
-            OmegaConfBaseException,
-            yaml.YAMLError,
-            OSError,
-            ValueError,
-            KeyError,
-        ) as error:
+        except bad_input as error:
             raise ConfigError(f"the configuration does not compose: {_one_line(error)}") from error
         return dict(tree)
 
@@ -194,18 +190,25 @@ class Composer:
             return
         known = [key for key in node if key not in ("_target_", "hydra")]
         if not path:
-            raise ConfigError(
-                f"unknown key '{name}'{nearest(name, [*known, PRESET_GROUP])}; "
-                f"known: {', '.join([PRESET_GROUP, *known])}"
-            )
+            known = [PRESET_GROUP, *known]
+            raise ConfigError(f"unknown key '{name}'{nearest(name, known)}; known: {', '.join(known)}")
         owner = ".".join(path)
+        hint = nearest(name, known)
         if len(path) == 1 and owner in GROUPS:
-            option = tree["hydra"]["runtime"]["choices"][owner]
-            owner = f"option {option} of {owner}"
+            elsewhere = self._options_with(owner, name)
+            hint = f" (only {', '.join(elsewhere)} has)" if elsewhere else hint
+            owner = f"option {tree['hydra']['runtime']['choices'][owner]} of {owner}"
         raise ConfigError(
-            f"{setting.key}: {owner} has no parameter '{name}'{nearest(name, known)}; "
-            f"it has {', '.join(known) or 'none'}"
+            f"{setting.key}: {owner} has no parameter '{name}'{hint}; it has {', '.join(known) or 'none'}"
         )
+
+    def _options_with(self, group: str, parameter: str) -> list[str]:
+        """Options of a group that have a parameter of this name."""
+        return [
+            option
+            for option, file in self.options[group].items()
+            if parameter in (item.name for item in read_option(file).parameters)
+        ]
 
 
 def _refuse_equal_cells(cells: Sequence[Cell]) -> None:
@@ -246,10 +249,10 @@ def _interpolations(node: Any, path: str) -> Iterator[tuple[str, str]]:
 
 def _calls_resolver(text: str) -> bool:
     from omegaconf.errors import GrammarParseError
-    from omegaconf.grammar_parser import OmegaConfGrammarParser, parse
+    from omegaconf.grammar_parser import parse
 
     def walk(context: Any) -> bool:
-        if isinstance(context, OmegaConfGrammarParser.InterpolationResolverContext):
+        if type(context).__name__ == "InterpolationResolverContext":
             return True
         return any(walk(child) for child in getattr(context, "children", None) or ())
 

@@ -78,8 +78,8 @@ def fly_overrides(overrides: Sequence[str], values: Mapping[str, Any]) -> Trial:
     command = Composer().command(settings)
     if len(command.cells) != 1 or len(command.seeds) != 1:
         raise ConfigError(
-            f"uavexp.fly flies one trial, these are {len(command.cells)} cells and {len(command.seeds)} seeds; "
-            "use the command line for grids"
+            f"uavexp.fly flies one trial, not {len(command.cells)} cells and {len(command.seeds)} seeds; "
+            "grids are flown from the command line"
         )
     if command.out is not None:
         raise ConfigError("uavexp.fly writes nothing: out has no place here")

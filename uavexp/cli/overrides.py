@@ -187,13 +187,13 @@ def _seeds_of(value: Any) -> Sequence[int]:
     text = str(value).strip()
     if text == "range":
         return PAPER_SEEDS
-    if "," in text:
-        return [seed for item in text.split(",") for seed in _seeds_of(item)]
     if match := _RANGE.fullmatch(text):
         return _seed_range(text, int(match[1]), int(match[2]), int(match[3] or 1))
     if inner := re.fullmatch(r"range\(\s*(-?\d+)\s*(?:,\s*(-?\d+)\s*)?(?:,\s*(-?\d+)\s*)?\)", text):
         start, stop = (0, int(inner[1])) if inner[2] is None else (int(inner[1]), int(inner[2]))
         return _seed_range(text, start, stop, int(inner[3] or 1))
+    if "," in text:
+        return [seed for item in text.split(",") for seed in _seeds_of(item)]
     if re.fullmatch(r"-?\d+", text):
         return [int(text)]
     raise ConfigError(_not_a_seed(value))

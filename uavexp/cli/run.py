@@ -96,19 +96,27 @@ def _fly_job(job: Job, root: Path, run: dict[str, Any], terminal: Terminal, othe
     except Exception as error:
         if isinstance(error, UavexpError) and not others_flown:
             raise  # bad input, and nothing is written yet
-        wall = {"command": job.command, "wall_trial_s": time.perf_counter() - begin_s}
-        folder.mkdir(exist_ok=True)
-        write_failure(job.cell, job.seed, folder, run, wall, error)
-        row = failed_row(job.cell, job.seed, wall["wall_trial_s"], job.folder)
+        wall_s = time.perf_counter() - begin_s
+        _make_folder(folder)
+        write_failure(job.cell, job.seed, folder, run, _wall(job, wall_s), error)
+        row = failed_row(job.cell, job.seed, wall_s, job.folder)
         return Result(job=job, row=row, trial=None, reason=reason_of(error))
-    wall = {"command": job.command, "wall_trial_s": time.perf_counter() - begin_s}
+    wall_s = time.perf_counter() - begin_s
+    _make_folder(folder)
+    write_trial(trial, folder, run, _wall(job, wall_s))
+    row = flown_row(trial, laps(trial), wall_s, job.folder)
+    return Result(job=job, row=row, trial=trial, reason=trial.log.reason)
+
+
+def _make_folder(folder: Path) -> None:
     try:
         folder.mkdir(exist_ok=True)
     except OSError as error:
         raise RecordError(f"{folder}: cannot be made ({error.strerror})") from error
-    write_trial(trial, folder, run, wall)
-    row = flown_row(trial, laps(trial), wall["wall_trial_s"], job.folder)
-    return Result(job=job, row=row, trial=trial, reason=trial.log.reason)
+
+
+def _wall(job: Job, wall_s: float) -> dict[str, Any]:
+    return {"command": job.command, "wall_trial_s": wall_s}
 
 
 def _check_worlds(command: Command) -> None:

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 _PATIENCE_S = 2.0  # nothing is shown for work that is done sooner
 _PLAIN_PERIOD_S = 10.0  # between lines when the output is no terminal
 _MAX_ROWS = 60
+_TABLE_WIDTH = 150
 
 
 class Terminal:
@@ -82,7 +83,8 @@ class Terminal:
 
     def summary(self, results: Sequence[Result], root: Path) -> None:
         """Print the table of trials, how to repeat them, their pictures and, last, the folder."""
-        self._console.print(_table(results[:_MAX_ROWS], root))
+        # as wide as it needs: a cut-off number is worse than a wrapped line
+        self._console.print(_table(results[:_MAX_ROWS]), width=_TABLE_WIDTH, crop=False)
         if len(results) > _MAX_ROWS:
             self._say(f"... and {len(results) - _MAX_ROWS} more in trials.parquet")
         for result in results[:_MAX_ROWS]:
@@ -101,10 +103,10 @@ class Terminal:
         self._console.print(line, markup=False)
 
 
-def _table(results: Sequence[Result], root: Path) -> Table:
+def _table(results: Sequence[Result]) -> Table:
     table = Table(title=None, box=None, pad_edge=False, header_style="bold")
     for name in ("strategy", "world", "seed", "outcome"):
-        table.add_column(name)
+        table.add_column(name, no_wrap=True)
     for name in (
         "contacts",
         "time s",
@@ -115,7 +117,7 @@ def _table(results: Sequence[Result], root: Path) -> Table:
         "tracking m",
         "wall s",
     ):
-        table.add_column(name, justify="right")
+        table.add_column(name, justify="right", no_wrap=True)
     for result in results:
         row = result.row
         table.add_row(

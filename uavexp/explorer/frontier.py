@@ -2,8 +2,9 @@
 
 Frontier F = free cells of the planar map with an unknown 8-neighbour. Each cluster of F
 gives one candidate: its centroid, moved up the distance field until the clearance is
-enough. A candidate g is kept when d(g) > d_min and a path over known-free cells leads
-there, and is scored
+enough. A candidate g is kept when d(g) > d_min and a path leads there (over known-free
+cells; over unknown ones too, at `unknown_cost` times their length, when `unknown` is
+optimistic), and is scored
 
     S(g) = alpha J_info(g) - beta J_cost(g) - gamma J_target(g)
 
@@ -44,6 +45,13 @@ from uavexp.mapping.base import DistanceField
 from uavexp.types import Bool, Float, Float32, Goal, Limits, Observation
 
 
+class Unknown(StrEnum):
+    """Whether a path to a goal may cross unknown cells."""
+
+    OPTIMISTIC = "optimistic"
+    CONSERVATIVE = "conservative"
+
+
 class Clustering(StrEnum):
     """How frontier cells are grouped."""
 
@@ -57,7 +65,8 @@ class _Search:
 
     planar: PlanarMap
     inside: Bool  # (X, Y) cells within the flight bounds
-    from_vehicle: Float32  # (X, Y) over known-free cells, in cells
+    known: Float32  # (X, Y) path length from the vehicle over known-free cells, in cells
+    from_vehicle: Float32  # (X, Y) path cost from the vehicle, over unknown cells too if optimistic
     from_target: Float32 | None  # (X, Y) with unknown as free, in cells
     target_cell: tuple[int, int] | None
 
@@ -87,6 +96,8 @@ class Frontier:
     min_clearance_m: float = 0.3  # d_min
     enough_clearance_m: float = 0.6
     cell_m: float = 0.15
+    unknown: Unknown = Unknown.OPTIMISTIC
+    unknown_cost: float = 1.5
     band_below_m: float = 0.2
     band_above_m: float = 0.2
     min_distance_m: float = 0.8
@@ -100,6 +111,8 @@ class Frontier:
 
     def __post_init__(self) -> None:
         self.clustering = require_option("clustering", self.clustering, Clustering)
+        self.unknown = require_option("unknown", self.unknown, Unknown)
+        require(self.unknown_cost >= 1.0, f"unknown_cost must be >= 1, got {self.unknown_cost}")
         require_positive(
             rate_hz=self.rate_hz,
             neighbourhood_m=self.neighbourhood_m,
@@ -177,17 +190,19 @@ class Frontier:
         clear = inside & (planar.clearance > self.min_clearance_m)
         unit = np.ones(planar.state.shape, dtype=np.float32)
         vehicle = planar.cell_of(observation.state.position_m)
-        from_vehicle = path_lengths(clear & (planar.state == FREE), unit, vehicle)
+        known = from_vehicle = path_lengths(clear & (planar.state == FREE), unit, vehicle)
+        if self.unknown is Unknown.OPTIMISTIC:
+            cost = np.where(planar.state == UNKNOWN, np.float32(self.unknown_cost), unit)
+            from_vehicle = path_lengths(clear, cost, vehicle)
         if observation.target_m is None:
-            return _Search(planar, inside, from_vehicle, None, None)
+            return _Search(planar, inside, known, from_vehicle, None, None)
         target = planar.cell_of(observation.target_m)
-        from_target = path_lengths(clear | (inside & (planar.state == UNKNOWN)), unit, target)
-        return _Search(planar, inside, from_vehicle, from_target, target)
+        return _Search(planar, inside, known, from_vehicle, path_lengths(clear, unit, target), target)
 
     def _target_reachable(self, search: _Search, observation: Observation) -> bool:
         if search.target_cell is None or observation.target_m is None:
             return False
-        return bool(np.isfinite(search.from_vehicle[search.target_cell])) and not self._is_aside(
+        return bool(np.isfinite(search.known[search.target_cell])) and not self._is_aside(
             observation.target_m
         )
 

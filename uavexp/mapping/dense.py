@@ -9,7 +9,8 @@ pixel columns, before any voxel is looked at.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import dataclasses
+from dataclasses import dataclass
 
 import numba as nb
 import numpy as np
@@ -114,29 +115,19 @@ def integrate_scan(
             base_z = rotation[0, 2] * offset_x + rotation[1, 2] * offset_y + rotation[2, 2] * offset_z
             low, high = _clip(0.0, nz - 1.0, base_z - _NEAR_M, step_z)
             low, high = _clip(low, high, farthest_m - base_z, -step_z)
-            low, high = _clip(
-                low, high, fx * base_x + (cx + 0.5) * base_z, fx * step_x + (cx + 0.5) * step_z
-            )
+            low, high = _clip(low, high, fx * base_x + (cx + 0.5) * base_z, fx * step_x + (cx + 0.5) * step_z)
             right = cx - width + 0.5
-            low, high = _clip(
-                low, high, -fx * base_x - right * base_z, -fx * step_x - right * step_z
-            )
-            low, high = _clip(
-                low, high, fy * base_y + (cy + 0.5) * base_z, fy * step_y + (cy + 0.5) * step_z
-            )
+            low, high = _clip(low, high, -fx * base_x - right * base_z, -fx * step_x - right * step_z)
+            low, high = _clip(low, high, fy * base_y + (cy + 0.5) * base_z, fy * step_y + (cy + 0.5) * step_z)
             bottom = cy - height + 0.5
-            low, high = _clip(
-                low, high, -fy * base_y - bottom * base_z, -fy * step_y - bottom * step_z
-            )
+            low, high = _clip(low, high, -fy * base_y - bottom * base_z, -fy * step_y - bottom * step_z)
             if low > high:
                 continue
             # nothing behind the farthest surface of the pixel columns it crosses
             u_low = fx * (base_x + low * step_x) / (base_z + low * step_z) + cx
             u_high = fx * (base_x + high * step_x) / (base_z + high * step_z) + cx
             reach = -np.inf
-            for u in range(
-                max(int(min(u_low, u_high)), 0), min(int(max(u_low, u_high)) + 2, width)
-            ):
+            for u in range(max(int(min(u_low, u_high)), 0), min(int(max(u_low, u_high)) + 2, width)):
                 reach = max(reach, farthest[u])
             low, high = _clip(low, high, reach + rule.truncation_m - base_z, -step_z)
             column = (i * ny + j) * nz
@@ -152,7 +143,7 @@ def integrate_scan(
                     continue
                 observed = min(observed, rule.truncation_m)
                 at = column + k
-                before, had, byte = tsdf[at], weight[at], live[at]
+                before, had, byte = tsdf[at], np.int64(weight[at]), np.int64(live[at])
                 if keeps_free(observed, before, had, byte, rule):
                     continue
                 fused = (had * before + observed) * reciprocal[had]
@@ -168,7 +159,7 @@ def integrate_scan(
 class Dense(MapParameters):
     """TSDF on a dense grid over the world's bounds; see `MapParameters`."""
 
-    _map: OccupancyMap | None = field(default=None, init=False, repr=False)
+    _map: OccupancyMap | None = dataclasses.field(default=None, init=False, repr=False)
 
     def reset(self, bounds_m: Float) -> None:
         """Begin a trial with everything unknown inside `bounds_m` (2, 3).

@@ -285,43 +285,57 @@ def _stage_x(
 
 
 @nb.njit(cache=True)
-def _emit(
+def _count_changed(
     shape: tuple[int, int, int], touched: Int32, outside: Int16, inside: Int16, published: Int16,
-    table: Float32, cap: int, max_distance_m: float, seen: UInt8, seen_column: UInt8, distance: Float32,
-    voxel: Int32, old: Float32, new: Float32, first_seen: UInt8, occupied: UInt8,
-) -> int:  # fmt: skip
-    """Write changed distances and the change log, in ascending voxel order; clear the marks."""
+    seen: UInt8, columns: Int32,
+) -> tuple[int, int]:  # fmt: skip
+    """List, in ascending order, the touched columns that hold a change; count columns and voxels."""
     nx, ny, nz = shape
-    count = 0
+    count, total = 0, 0
     for x in range(nx):
         for y in range(touched[x, 0], touched[x, 1]):
             begin = (x * ny + y) * nz
             far, near = outside[begin : begin + nz], inside[begin : begin + nz]
-            was = published[begin : begin + nz]
-            differs = np.int16(0)
+            was, fresh = published[begin : begin + nz], seen[begin : begin + nz]
+            changed = np.int16(0)
             for k in range(nz):
-                differs |= np.int16(far[k] - near[k]) ^ was[k]
-            if differs == 0 and seen_column[x * ny + y] == 0:
-                continue
-            for k in range(nz):
-                value = np.int16(far[k] - near[k])
-                fresh = seen[begin + k]
-                if value == was[k] and fresh == 0:
-                    continue
-                metres = table[value + cap]
-                voxel[count] = begin + k
-                old[count] = max_distance_m if fresh else distance[begin + k]
-                new[count] = metres
-                first_seen[count] = fresh
-                occupied[count] = near[k] > 0
-                distance[begin + k] = metres
-                was[k] = value
-                seen[begin + k] = 0
+                changed += np.int16((np.int16(far[k] - near[k]) != was[k]) | (fresh[k] != 0))
+            if changed > 0:
+                columns[count] = x * ny + y
                 count += 1
-            seen_column[x * ny + y] = 0
+                total += changed
         touched[x, 0] = ny
         touched[x, 1] = 0
-    return count
+    return count, total
+
+
+@nb.njit(cache=True)
+def _emit(
+    columns: Int32, outside: Int16, inside: Int16, published: Int16, seen: UInt8, table: Float32, cap: int,
+    max_distance_m: float, distance: Float32,
+    voxel: Int32, old: Float32, new: Float32, first_seen: UInt8, occupied: UInt8,
+) -> None:  # fmt: skip
+    """Publish the new distances of the listed columns and write the change log (with one spare row)."""
+    nz = distance.shape[2]
+    beyond = np.float32(max_distance_m)
+    count = 0
+    flat = distance.reshape(-1)
+    for n in range(columns.shape[0]):
+        begin = columns[n] * nz
+        far, near = outside[begin : begin + nz], inside[begin : begin + nz]
+        was, fresh, metres = published[begin : begin + nz], seen[begin : begin + nz], flat[begin : begin + nz]
+        for k in range(nz):  # every row is written, and kept when the voxel changed: no branches
+            value = np.int16(far[k] - near[k])
+            after = table[value + cap]
+            voxel[count] = begin + k
+            old[count] = beyond if fresh[k] else metres[k]
+            new[count] = after
+            first_seen[count] = fresh[k]
+            occupied[count] = near[k] > 0
+            count += (value != was[k]) | (fresh[k] != 0)
+            metres[k] = after
+            was[k] = value
+            fresh[k] = 0
 
 
 @nb.njit(cache=True)
@@ -337,16 +351,13 @@ def _flag_columns(shape: tuple[int, int, int], voxels: Int32, flagged: UInt8, bo
 
 
 @nb.njit(cache=True)
-def _mark_seen(
-    shape: tuple[int, int, int], voxels: Int32, seen: UInt8, seen_column: UInt8, touched: Int32
-) -> None:
+def _mark_seen(shape: tuple[int, int, int], voxels: Int32, seen: UInt8, touched: Int32) -> None:
     """Mark voxels first seen and have their columns looked at."""
     _, ny, nz = shape
     for n in range(voxels.shape[0]):
         column = voxels[n] // nz
         x, y = column // ny, column % ny
         seen[voxels[n]] = 1
-        seen_column[column] = 1
         touched[x, 0] = min(touched[x, 0], y)
         touched[x, 1] = max(touched[x, 1], y + 1)
 
@@ -407,14 +418,10 @@ class SignedDistance:
         self._inside = self._stages(False, 0, size)
         self._published = np.full(size, self.cap, np.int16)
         self._seen = np.zeros(size, np.uint8)
-        self._seen_column = np.zeros(nx * ny, np.uint8)
         self._flagged = np.zeros(nx * ny, np.uint8)
         self._marked = np.zeros(nx * ny, np.uint8)
         self._touched = np.tile(np.array([ny, 0], np.int32), (nx, 1))
         self._changed = [self._columns(nx * ny, nz) for _ in range(2)]
-        self._log: tuple[Any, ...] = tuple(
-            np.empty(size, kind) for kind in (np.int32, np.float32, np.float32, np.uint8, np.uint8)
-        )
 
     @staticmethod
     def _stages(to_occupied: bool, start: int, size: int) -> _Stages:
@@ -453,13 +460,19 @@ class SignedDistance:
             flags = self._flagged.reshape(self.shape[:2])
             flags[box[0] : box[1], box[2] : box[3]] = 0
         if first_seen.size:
-            _mark_seen(self.shape, first_seen, self._seen, self._seen_column, self._touched)
-        count = _emit(
+            _mark_seen(self.shape, first_seen, self._seen, self._touched)
+        columns = self._changed[0][0]
+        count, total = _count_changed(
             self.shape, self._touched, self._outside.along_x, self._inside.along_x, self._published,
-            self._table, self.cap, self.max_distance_m, self._seen, self._seen_column,
-            self.distance.reshape(-1), *self._log,
+            self._seen, columns,
         )  # fmt: skip
-        voxel, old, new, fresh, occupied = (array[:count].copy() for array in self._log)
+        kinds = (np.int32, np.float32, np.float32, np.uint8, np.uint8)
+        log: tuple[Any, ...] = tuple(np.empty(total + 1, kind) for kind in kinds)
+        _emit(
+            columns[:count], self._outside.along_x, self._inside.along_x, self._published, self._seen,
+            self._table, self.cap, self.max_distance_m, self.distance, *log,
+        )  # fmt: skip
+        voxel, old, new, fresh, occupied = (array[:total] for array in log)
         return MapUpdate(
             time_s=time_s,
             voxel=voxel,

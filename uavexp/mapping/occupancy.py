@@ -40,7 +40,7 @@ _UNKNOWN, _FREE, _OCCUPIED = 0, 1, 2  # of `mapping.base`; literals so that kern
 # bits of a live voxel's byte: 0-1 state, 2 on the list of changes, 3-7 evidence
 _STATE, _LISTED, _EVIDENCE = 3, 4, 3
 LARGEST_EVIDENCE = 31
-_BYTES_PER_VOXEL = 45  # TSDF 7, ESDF stages and scratch 38
+_BYTES_PER_VOXEL = 56  # TSDF and state 7, ESDF 25, lists at their longest 24
 
 
 class Rule(NamedTuple):
@@ -110,8 +110,11 @@ def _mark_ball(
             for z in range(max(int(centre[2] - radius), 0), min(int(centre[2] + radius) + 1, nz)):
                 dx, dy, dz = x + 0.5 - centre[0], y + 0.5 - centre[1], z + 0.5 - centre[2]
                 at = (x * ny + y) * nz + z
-                if dx * dx + dy * dy + dz * dz <= radius * radius and (live[at] & _STATE) == _UNKNOWN:
-                    count = enlist(at, live[at] | _FREE, live, state, changes, count)
+                if (
+                    dx * dx + dy * dy + dz * dz <= radius * radius
+                    and (np.int64(live[at]) & _STATE) == _UNKNOWN
+                ):
+                    count = enlist(at, np.int64(live[at]) | _FREE, live, state, changes, count)
     return count
 
 
@@ -123,8 +126,8 @@ def _publish(
     flips, firsts = 0, 0
     for n in range(count):
         at = changes[n]
-        live[at] &= ~_LISTED & 255
-        before, after = state[at], live[at] & _STATE
+        live[at] = np.int64(live[at]) & ~_LISTED
+        before, after = np.int64(state[at]), np.int64(live[at]) & _STATE
         if before == after:
             continue
         if before == _UNKNOWN:
@@ -230,6 +233,4 @@ class OccupancyMap:
             self.live, self.state, self.changes, self.changed, self._flipped, self._first_seen
         )
         self.changed = 0
-        return self._esdf.update(
-            time_s, self.field.state, self._flipped[:flips], self._first_seen[:firsts]
-        )
+        return self._esdf.update(time_s, self.field.state, self._flipped[:flips], self._first_seen[:firsts])

@@ -25,7 +25,7 @@ class MapParameters:
     miss_evidence: int = 1
     occupied_evidence: int = 4
     max_evidence: int = 12
-    max_memory_mb: float = 800.0
+    max_memory_mb: float = 1000.0
 
     def __post_init__(self) -> None:
         require_positive(

@@ -17,7 +17,10 @@ from uavexp.planner.spline import SAMPLES
 from uavexp.types import Float, Float32
 
 HARD_WEIGHT = 10.0
-_NEAR = 0.5  # share of a limit above which a control point's norm gets a row in the QP
+_NEAR_LIMIT = 0.6
+_NEAR_BOUND_M = 0.5
+_EXCESS_WEIGHT = 300.0  # of relative excess over a limit in the merit: an exact penalty
+_TURN = np.array([[1.0, 0.0], [0.85, 0.5267827], [0.85, -0.5267827]])  # cosine, sine of 0, ±32°
 
 
 @nb.njit(cache=True, inline="always")
@@ -39,11 +42,21 @@ def merit(
     weights: Float,
     tether_m: Float,
     tether_weight: Float,
+    limits: Float,
 ) -> float:
-    """Value of the merit at control points (N, 3); weights are λ, safe and hard distance."""
-    total = 0.0
-    for axis in range(3):
-        total += control[:, axis] @ (energy @ control[:, axis]) / h**3
+    """Value of the merit at control points (N, 3).
+
+    `weights` are λ, safe and hard distance; `limits` are those of speed and acceleration.
+    """
+    bent = energy @ control
+    total = (control * bent).sum() / h**3
+    for i in range(2, control.shape[0] - 3):
+        fast, strong = 0.0, 0.0
+        for axis in range(3):
+            fast += (control[i + 1, axis] - control[i, axis]) ** 2
+            strong += (control[i - 1, axis] - 2.0 * control[i, axis] + control[i + 1, axis]) ** 2
+        total += _EXCESS_WEIGHT * max(np.sqrt(fast) / (h * limits[0]) - 1.0, 0.0)
+        total += _EXCESS_WEIGHT * max(np.sqrt(strong) / (h * h * limits[1]) - 1.0, 0.0)
     points = _samples(control, position)
     d, _ = value_and_gradient(distance, origin_m, voxel_m, points)
     share = h / SAMPLES
@@ -110,6 +123,7 @@ def quadratic_model(
     weights: Float,
     tether_m: Float,
     tether_weight: Float,
+    limits: Float,
 ) -> tuple[Float, Float]:
     """Hessian (3n, 3n) and gradient (3n,) of the merit over the n = N - 6 free control points.
 
@@ -166,36 +180,87 @@ def quadratic_model(
 
 
 @nb.njit(cache=True)
-def limit_rows(control: Float, h: float, max_speed: float, max_acceleration: float) -> tuple[Float, Float]:
-    """Rows (R, 3n) and right sides (R,) that keep control velocities and accelerations in limits.
+def limit_rows(control: Float, h: float, limits: Float, bounds: Float) -> tuple[Float, Float]:
+    """Rows (R, 3n) and right sides (R,) of the QP: speed, acceleration and flight bounds.
 
-    Each norm limit is replaced by the half space touching its ball where the present vector
-    points: outer, so a QP without solution means that the limits themselves cannot be kept.
-    Only vectors beyond half their limit get a row.
+    Each norm limit is replaced by half spaces touching its ball: where the present vector
+    points, and for accelerations also at 32° to either side of it in plan. They hold the ball,
+    so a QP without solution means that the limits themselves cannot be kept; an acceleration
+    that turns by up to 48° exceeds its limit by 4 % at most. Only vectors beyond 0.6 of their limit
+    and control points within 0.5 m of a bound get rows.
     """
     count = control.shape[0]
-    n = count - 6
-    rows, sides = np.zeros((2 * count, 3 * n)), np.empty(2 * count)
+    rows, sides = np.zeros((10 * count, 3 * (count - 6))), np.empty(10 * count)
     size = 0
-    stencil = np.zeros((2, 3))
-    stencil[0, 0], stencil[0, 1] = -1.0, 1.0
-    stencil[1, 0], stencil[1, 1], stencil[1, 2] = 1.0, -2.0, 1.0
+    stencil = np.array([[-1.0, 1.0, 0.0], [1.0, -2.0, 1.0]])
     vector = np.empty(3)
     for order in range(2):
-        limit = max_speed * h if order == 0 else max_acceleration * h * h
-        for i in range(count - 1 - order):
-            if i + 1 + order < 3 or i > count - 4:  # all of its control points are pinned
-                continue
-            vector[:] = 0.0
-            for j in range(2 + order):
-                vector += stencil[order, j] * control[i + j]
+        limit = limits[order] * h ** (1 + order)
+        for i in range(2 - order, count - 3):
+            for axis in range(3):
+                vector[axis] = 0.0
+                for j in range(2 + order):
+                    vector[axis] += stencil[order, j] * control[i + j, axis]
             norm = np.sqrt((vector * vector).sum())
-            if norm < _NEAR * limit:
+            if norm < _NEAR_LIMIT * limit:
                 continue
-            for j in range(2 + order):
-                if 3 <= i + j < count - 3:
-                    for axis in range(3):
-                        rows[size, 3 * (i + j - 3) + axis] = stencil[order, j] * vector[axis] / norm
-            sides[size] = limit - norm
-            size += 1
+            for turn in range(1 + 2 * order):
+                x = (_TURN[turn, 0] * vector[0] - _TURN[turn, 1] * vector[1]) / norm
+                y = (_TURN[turn, 1] * vector[0] + _TURN[turn, 0] * vector[1]) / norm
+                z = vector[2] / norm
+                sides[size] = limit * np.sqrt(x * x + y * y + z * z)
+                sides[size] -= x * vector[0] + y * vector[1] + z * vector[2]
+                for j in range(2 + order):
+                    if 3 <= i + j < count - 3:
+                        at = 3 * (i + j - 3)
+                        rows[size, at] = stencil[order, j] * x
+                        rows[size, at + 1] = stencil[order, j] * y
+                        rows[size, at + 2] = stencil[order, j] * z
+                size += 1
+    for i in range(3, count - 3):
+        for axis in range(3):
+            for side in range(2):
+                sign = 2.0 * side - 1.0  # -1 at the lower bound, 1 at the upper
+                room = sign * (bounds[side, axis] - control[i, axis])
+                if room < _NEAR_BOUND_M:
+                    rows[size, 3 * (i - 3) + axis] = sign
+                    sides[size] = room
+                    size += 1
     return rows[:size], sides[:size]
+
+
+@nb.njit(cache=True)
+def line_search(
+    control: Float,
+    step: Float,
+    h: float,
+    energy: Float,
+    position: Float,
+    distance: Float32,
+    origin_m: Float,
+    voxel_m: float,
+    weights: Float,
+    tether_m: Float,
+    tether_weight: Float,
+    limits: Float,
+) -> tuple[Float, float]:
+    """First of a few shares of a QP's step (n, 3) that lowers the merit, and by what share.
+
+    Args:
+        control: (N, 3).
+        step: of the free control points.
+        h: and the rest: see `merit`.
+    """
+    last = control.shape[0] - 3
+    grid = (distance, origin_m, voxel_m)
+    pull = (weights, tether_m, tether_weight, limits)
+    present = merit(control, h, energy, position, *grid, *pull)
+    share = 1.0
+    for _ in range(4):
+        trial = control.copy()
+        trial[3:last] += share * step
+        value = merit(trial, h, energy, position, *grid, *pull)
+        if value < present:
+            return trial, (present - value) / present
+        share *= 0.4
+    return control, 0.0

@@ -16,7 +16,7 @@ import math
 import numba as nb
 import numpy as np
 
-from uavexp.triangle_grid import TriangleGrid, ball_meets_mesh
+from uavexp.triangle_grid import TriangleGrid, ball_meets_mesh, box_meets_mesh
 from uavexp.types import Bool, Float, Int, UInt8
 
 SIGHT_STEP_M = 0.05  # between the points tested along a line of sight
@@ -47,6 +47,23 @@ def passable_layer(
             point[1] = low[1] + (j + 0.5) * cell
             layer[i, j] = not ball_meets_mesh(grid, point, radius)
     return layer
+
+
+@nb.njit(cache=True)
+def empty_columns(
+    grid: TriangleGrid, low: Float, cell: float, shape: Int, height: float, half: Float
+) -> Bool:
+    """Which upright boxes (X, Y), of half lengths `half` (3,), one a cell, meet no triangle."""
+    empty = np.empty((shape[0], shape[1]), dtype=np.bool_)
+    centre = np.empty(3)
+    centre[2] = height
+    upright = np.eye(3)
+    for i in range(shape[0]):
+        centre[0] = low[0] + (i + 0.5) * cell
+        for j in range(shape[1]):
+            centre[1] = low[1] + (j + 0.5) * cell
+            empty[i, j] = not box_meets_mesh(grid, centre, upright, half)
+    return empty
 
 
 @nb.njit(cache=True)

@@ -21,7 +21,8 @@ class RandomColumns:
         size_m: inner size of the hall [x, y, z], m.
         density_per_m2: columns asked for per m² of floor, 1/m²; fewer where no room is left.
         width_m: least and greatest width [min, max], m.
-        gap_m: least free distance between two columns, m.
+        gap_m: least free distance between two columns of different rows, about, m.
+        row: greatest number of columns that stand side by side in one row, each row 1 to `row` long.
         partial_share: share that reaches only from the ceiling down or the floor up, 0 to 1.
         flight_height_m: z of start and target, m.
         clearance_m: guaranteed distance of the body's centre from everything, m.
@@ -30,7 +31,8 @@ class RandomColumns:
     size_m: Sequence[float] = (26.0, 16.0, 3.0)
     density_per_m2: float = 0.3
     width_m: Sequence[float] = (0.3, 1.2)
-    gap_m: float = 0.9
+    gap_m: float = 1.0
+    row: int = 4
     partial_share: float = 0.3
     flight_height_m: float = 1.2
     clearance_m: float = 0.45
@@ -40,6 +42,7 @@ class RandomColumns:
         require_non_negative(density_per_m2=self.density_per_m2, gap_m=self.gap_m)
         require(self.density_per_m2 <= 10.0, f"density_per_m2 must be <= 10, got {self.density_per_m2}")
         self.width_m = indoor.checked_range("width_m", self.width_m)
+        require(1 <= self.row <= 50, f"row must be 1 to 50 columns, got {self.row}")
         require(0.0 <= self.partial_share <= 1.0, f"partial_share must be 0 to 1, got {self.partial_share}")
 
     def generate(self, rng: np.random.Generator) -> World:
@@ -55,22 +58,31 @@ class RandomColumns:
         )
 
     def _furnish(self, boxes: Boxes, rng: np.random.Generator) -> None:
-        length, width, height = self.size_m
+        length, width, _ = self.size_m
         taken: list[tuple[float, float, float]] = []
-        for _ in range(round(self.density_per_m2 * length * width)):
-            x, y = rng.uniform(0.0, (length, width))
-            across = rng.uniform(*self.width_m)
-            square, turn, kind, cut = rng.random(4)
-            radius = 0.5 * across * (np.sqrt(2.0) if square < 0.4 else 1.09)
-            if not indoor.apart(x, y, taken, radius + self.gap_m):
-                continue
-            taken.append((x, y, radius))
-            low, high = 0.0, height
-            if kind < 0.5 * self.partial_share:
-                low = (0.45 + 0.35 * cut) * height  # hangs from the ceiling
-            elif kind < self.partial_share:
-                high = (0.15 + 0.35 * cut) * height  # a stump
-            if square < 0.4:
-                boxes.stand(x, y, (across, across, high - low), 0.5 * np.pi * turn, low)
-            else:
-                boxes.column(x, y, across, low, high)
+        missing = round(self.density_per_m2 * length * width)
+        while missing > 0:
+            x, y, turn = rng.uniform(0.0, (length, width, np.pi))
+            members: list[tuple[float, float, float]] = []
+            for _ in range(int(rng.integers(1, self.row + 1))):
+                across = rng.uniform(*self.width_m)
+                if indoor.apart(x, y, taken, 0.5 * across + self.gap_m):
+                    members.append((x, y, 0.5 * across))
+                    self._column(boxes, rng, x, y, across)
+                x, y = x + across * np.cos(turn), y + across * np.sin(turn)
+                missing -= 1
+            taken.extend(members)
+
+    def _column(self, boxes: Boxes, rng: np.random.Generator, x: float, y: float, across: float) -> None:
+        """One column, round or square, whole or in part."""
+        height = self.size_m[2]
+        square, turn, kind, cut = rng.random(4)
+        low, high = 0.0, height
+        if kind < 0.5 * self.partial_share:
+            low = (0.45 + 0.35 * cut) * height  # hangs from the ceiling
+        elif kind < self.partial_share:
+            high = (0.15 + 0.35 * cut) * height  # a stump
+        if square < 0.4:
+            boxes.stand(x, y, (across, across, high - low), 0.5 * np.pi * turn, low)
+        else:
+            boxes.column(x, y, across, low, high)

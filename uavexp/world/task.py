@@ -12,10 +12,9 @@ import math
 import numpy as np
 from scipy import ndimage
 
-from uavexp.errors import WorldError
 from uavexp.geometry import polyline_length_m
 from uavexp.scene import Scene
-from uavexp.types import Bool, Difficulty, Float, Float32, Int32, World
+from uavexp.types import Difficulty, Float, Float32, Int32, World
 from uavexp.world import lattice
 
 CELL_M = 0.1  # spacing of the lattice on which the shortest path is exact
@@ -23,7 +22,9 @@ LAYER_CELL_M = 0.2  # spacing of the layer from which start and target are drawn
 MAX_KNOTS = 120  # points of a path that is being tightened
 MIN_KNOT_STEP_M = 0.2
 TIGHTEN_ROUNDS = 3
-GAP_STEP_M = 0.02  # between the points where the clearance of the path is measured
+BAND_M = 0.6  # height of the band in which clutter is measured, around the start's height
+GAP_STEP_M = 0.05  # between the points where the width of the passage is measured
+GAP_CHORDS = 7  # directions tried at each
 BOTTLENECK_STEP_M = 0.01
 
 
@@ -95,29 +96,40 @@ def free_layer(
 
 
 def clutter_density(scene: Scene, flight_bounds_m: Float, start_m: Float) -> float:
-    """Share of the layer at the start's height that air around the start does not fill.
+    """Share of the band around the start's height that air around the start does not fill.
 
-    A 0.1 m cell is air when no surface is nearer to its centre than half a cell, and when
-    air cells join it with the start; so the inside of a closed solid counts as occupied,
-    whether the mesh has an inside or not.
+    A column of 0.1 m by 0.1 m, `BAND_M` high, is air when no surface enters it and when such
+    columns join it with the start; so the inside of a closed solid counts as occupied,
+    whether the mesh has an inside or not, and so does what lies behind a closed wall.
     """
     shape = lattice.shape_of(flight_bounds_m, CELL_M)
-    air: Bool = lattice.passable_layer(
-        scene.grid, flight_bounds_m[0], CELL_M, shape, start_m[2], 0.5 * CELL_M
-    )
+    half = np.array([0.5 * CELL_M, 0.5 * CELL_M, 0.5 * BAND_M])
+    air = lattice.empty_columns(scene.grid, flight_bounds_m[0], CELL_M, shape, start_m[2], half)
     labels = ndimage.label(air)[0]
     i, j = np.minimum(((start_m[:2] - flight_bounds_m[0, :2]) / CELL_M).astype(int), shape[:2] - 1)
     return 1.0 - float(np.count_nonzero(labels == labels[i, j])) / air.size if air[i, j] else 1.0
 
 
 def narrowest_gap_m(scene: Scene, path_m: Float) -> float:
-    """Twice the smallest distance between the path (P, 3) and any surface, m."""
-    length = polyline_length_m(path_m)
-    count = max(2, math.ceil(length / GAP_STEP_M))
-    at = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path_m, axis=0), axis=1))])
-    along = np.linspace(0.0, at[-1], count)
-    points = np.column_stack([np.interp(along, at, path_m[:, axis]) for axis in range(3)])
-    return 2.0 * float(scene.distance_m(points).min())
+    """Width of the narrowest passage along the path (P, 3), m: a doorway's free width.
+
+    The least horizontal chord of free space through a point of the path, over the chords
+    within 45° of the perpendicular to it. (Twice the clearance along the path would say
+    nothing: a shortest path always rounds corners at exactly the required clearance.)
+    """
+    steps = np.diff(path_m, axis=0)
+    counts = np.maximum(1, np.ceil(np.linalg.norm(steps, axis=1) / GAP_STEP_M)).astype(np.int64)
+    segment = np.repeat(np.arange(steps.shape[0]), counts)
+    share = np.concatenate([(np.arange(count) + 0.5) / count for count in counts])
+    points = path_m[segment] + share[:, None] * steps[segment]
+    across = np.arctan2(steps[segment, 1], steps[segment, 0]) + 0.5 * math.pi
+    chord = np.full(points.shape[0], np.inf)
+    for turn in np.linspace(-0.25 * math.pi, 0.25 * math.pi, GAP_CHORDS):
+        along = np.column_stack([np.cos(across + turn), np.sin(across + turn), np.zeros_like(across)])
+        left = scene.cast(np.hstack([points, along]).astype(np.float32))[0]
+        right = scene.cast(np.hstack([points, -along]).astype(np.float32))[0]
+        chord = np.minimum(chord, left.astype(np.float64) + right)
+    return float(chord.min())
 
 
 def assemble(

@@ -1,0 +1,248 @@
+"""Records: canonical, sealed, whole or absent; logs come back as they were."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import stat
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pyarrow import parquet
+
+from uavexp.errors import RecordError
+from uavexp.logs import arrays_digest, log_arrays, read_log, write_log
+from uavexp.records import (
+    canonical_json,
+    code_digest,
+    digest,
+    read_record,
+    seal,
+    write_atomically,
+    write_text,
+)
+from uavexp.table import FIRST, write_table
+from uavexp.types import Contact, Outcome, PlanStatus, Replan, TrialLog
+
+json_values = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(), inner, max_size=3),
+    max_leaves=10,
+)
+
+
+def replan(time_s: float, changed: int) -> Replan:
+    return Replan(
+        time_s=time_s,
+        effective_s=time_s + 0.03 if changed else math.nan,
+        cause="map",
+        score=1.5,
+        position_m=np.array([1.0, 2.0, time_s]),
+        goal_m=np.array([4.0, 5.0, 6.0]),
+        status=PlanStatus.OK if changed else PlanStatus.NO_PATH,
+        reason="" if changed else "search exhausted",
+        path_change_m=0.25,
+        iterations=3,
+        expansions=100,
+        changed_m=np.full((changed, 3), time_s, dtype=np.float32),
+        trajectory_m=np.zeros((2 * changed, 3), dtype=np.float32),
+    )
+
+
+def flight(rows: int = 5, replans: int = 3, contacts: int = 1) -> TrialLog:
+    rng = np.random.default_rng(rows)
+    return TrialLog(
+        outcome=Outcome.REACHED,
+        reason="a reason",
+        step_s=0.01,
+        time_s=np.arange(rows) * 0.01,
+        position_m=rng.normal(size=(rows, 3)),
+        velocity_mps=rng.normal(size=(rows, 3)),
+        quaternion_wxyz=rng.normal(size=(rows, 4)),
+        estimated_position_m=rng.normal(size=(rows, 3)),
+        reference_position_m=rng.normal(size=(rows, 3)),
+        reference_acceleration_mps2=rng.normal(size=(rows, 3)),
+        clearance_m=rng.normal(size=rows),
+        tick_s=np.arange(rows) * 0.1,
+        esdf_clearance_m=rng.normal(size=rows),
+        changed_voxels=np.arange(rows),
+        decision_score=rng.normal(size=rows),
+        replans=tuple(replan(0.5 * index, index) for index in range(replans)),
+        dropped_triggers=2,
+        contacts=tuple(
+            Contact(start_s=1.0 + index, end_s=1.5 + index, position_m=np.ones(3))
+            for index in range(contacts)
+        ),
+        goals_m=rng.normal(size=(2, 3)),
+        seen_share=math.nan,
+        mapped_m=rng.normal(size=(4, 3)).astype(np.float32),
+        wall_s={"plan": np.ones(3)},
+    )
+
+
+@given(json_values)
+def test_canonical_json_is_json_and_the_same_value_gives_the_same_text(value: object) -> None:
+    text = canonical_json(value)
+    assert canonical_json(json.loads(text)) == text
+    assert "NaN" not in text.replace('"NaN"', "") or "NaN" in str(value)
+
+
+def test_key_order_does_not_matter_and_values_do() -> None:
+    assert digest({"a": 1, "b": 2.0}) == digest({"b": 2.0, "a": 1})
+    assert digest({"a": 1}) != digest({"a": 2})
+    assert digest({"a": math.nan}) == digest({"a": float("nan")})
+
+
+def test_numpy_values_are_written_as_what_they_are() -> None:
+    assert (
+        canonical_json({"a": np.float64(0.1), "b": np.arange(2), "c": np.True_})
+        == '{"a":0.1,"b":[0,1],"c":true}'
+    )
+
+
+def test_a_record_comes_back_with_its_nan(tmp_path: Path) -> None:
+    write_text(
+        tmp_path / "record.json", seal({"seed": 0, "metrics": {"x": math.nan, "y": math.inf, "z": 0.1}})
+    )
+    metrics = read_record(tmp_path)["metrics"]
+    assert math.isnan(metrics["x"])
+    assert metrics["y"] == math.inf
+    assert metrics["z"] == 0.1
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda text: text.replace('"seed":7', '"seed":8'),
+        lambda text: text[: len(text) // 2],
+        lambda text: "",
+        lambda text: "[]",
+        lambda text: text.replace('"sha256"', '"sha255"'),
+        lambda text: text.replace('"schema":1', '"schema":2'),
+        lambda text: text.replace('"metrics":{"x":1.5}', '"metrics":{}'),
+    ],
+)
+def test_a_changed_record_is_refused(tmp_path: Path, damage: object) -> None:
+    text = seal({"seed": 7, "metrics": {"x": 1.5}})
+    (tmp_path / "record.json").write_text(damage(text))  # type: ignore[operator]
+    with pytest.raises(RecordError, match="damaged"):
+        read_record(tmp_path)
+
+
+def test_a_record_of_another_schema_is_refused_even_when_sealed(tmp_path: Path) -> None:
+    body = {"seed": 7, "metrics": {}, "schema": 99}
+    (tmp_path / "record.json").write_text(json.dumps({**body, "sha256": digest(body)}))
+    with pytest.raises(RecordError, match="schema 99"):
+        read_record(tmp_path)
+
+
+def test_a_missing_record_is_told(tmp_path: Path) -> None:
+    with pytest.raises(RecordError, match="cannot be read"):
+        read_record(tmp_path)
+
+
+def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
+    write_text(tmp_path / "a.txt", "old")
+
+    def fail(file: object) -> None:
+        file.write(b"half")  # type: ignore[attr-defined]
+        raise OSError(28, "No space left on device")
+
+    with pytest.raises(RecordError, match="No space left"):
+        write_atomically(tmp_path / "a.txt", fail)
+    assert [item.name for item in tmp_path.iterdir()] == ["a.txt"]
+    assert (tmp_path / "a.txt").read_text() == "old"
+
+
+def test_a_written_file_is_as_readable_as_any_other(tmp_path: Path) -> None:
+    write_text(tmp_path / "a.txt", "x")
+    (tmp_path / "b.txt").write_text("x")
+    modes = [stat.S_IMODE((tmp_path / name).stat().st_mode) for name in ("a.txt", "b.txt")]
+    assert modes[0] == modes[1]
+
+
+@pytest.mark.parametrize(("rows", "replans", "contacts"), [(5, 3, 1), (1, 0, 0), (0, 1, 2)])
+def test_a_log_comes_back_as_it_was(tmp_path: Path, rows: int, replans: int, contacts: int) -> None:
+    log = flight(rows, replans, contacts)
+    write_log(tmp_path / "log.npz", log_arrays(log))
+    back = read_log(tmp_path / "log.npz")
+    assert arrays_digest(log_arrays(back)) == arrays_digest(log_arrays(log))
+    assert dataclasses.replace(back, wall_s={}).outcome is Outcome.REACHED
+    assert back.reason == "a reason"
+    assert [item.status for item in back.replans] == [item.status for item in log.replans]
+    assert [len(item.changed_m) for item in back.replans] == list(range(replans))
+    assert not back.wall_s  # clock times are no part of the record
+
+
+def test_equal_logs_give_equal_bytes(tmp_path: Path) -> None:
+    for name in ("a.npz", "b.npz"):
+        write_log(tmp_path / name, log_arrays(flight()))
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+
+
+def test_a_flipped_bit_in_a_log_is_refused(tmp_path: Path) -> None:
+    write_log(tmp_path / "log.npz", log_arrays(flight(200)))
+    data = bytearray((tmp_path / "log.npz").read_bytes())
+    data[len(data) // 3] ^= 1
+    (tmp_path / "log.npz").write_bytes(data)
+    with pytest.raises(RecordError):
+        read_log(tmp_path / "log.npz")
+
+
+def test_the_digest_of_arrays_sees_values_types_and_names() -> None:
+    base = {"a": np.arange(3.0)}
+    others = [
+        {"a": np.arange(3.0) + 1},
+        {"a": np.arange(3)},
+        {"b": np.arange(3.0)},
+        {"a": np.arange(3.0)[None]},
+    ]
+    assert len({arrays_digest(arrays) for arrays in [base, *others]}) == 5
+
+
+def test_the_code_digest_is_stable() -> None:
+    assert code_digest() == code_digest()
+
+
+def test_the_table_has_its_columns_in_order_and_its_pages_checked(tmp_path: Path) -> None:
+    rows = [
+        {
+            "strategy": "mcr",
+            "world": "w",
+            "seed": 1,
+            "success": True,
+            "jerk": 0.5,
+            "p_a_b": [1, 2],
+            "wall_x": 1.0,
+        },
+        {
+            "strategy": "mcr",
+            "world": "w",
+            "seed": 2,
+            "success": False,
+            "p_a_b": "text",
+            "p_a_a": 1,
+            "wall_x": 2.0,
+        },
+    ]
+    write_table(tmp_path / "trials.parquet", rows)
+    table = parquet.read_table(tmp_path / "trials.parquet", page_checksum_verification=True)
+    assert table.column_names == [*FIRST, "jerk", "p_a_a", "p_a_b", "wall_x"]
+    assert table["p_a_b"].to_pylist() == ["[1,2]", "text"]
+    assert table["success"].to_pylist() == [True, False]
+    assert table["jerk"].to_pylist() == [0.5, None]
+
+
+def test_a_flipped_bit_in_the_table_is_noticed(tmp_path: Path) -> None:
+    rows = [{"strategy": "mcr", "seed": seed, "path_length_m": seed * 1.1} for seed in range(500)]
+    file = tmp_path / "trials.parquet"
+    write_table(file, rows)
+    data = bytearray(file.read_bytes())
+    data[300] ^= 1
+    file.write_bytes(data)
+    with pytest.raises(OSError, match=r"(?i)crc|checksum|corrupt"):
+        parquet.read_table(file, page_checksum_verification=True)

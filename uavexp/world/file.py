@@ -1,0 +1,286 @@
+"""Somebody else's building: a mesh, a point cloud, a voxel set or a ROS map from a file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from uavexp.errors import WorldError, require, require_non_negative, require_positive
+from uavexp.scene import Scene
+from uavexp.types import Bool, Float, Float32, Int32, World
+from uavexp.world import readers, ros_map, task
+from uavexp.world.voxel_mesh import exposed_faces
+
+# rows of the rotation that turns each up axis to +z
+UP_AXES = {
+    "x": ((0, 1, 0), (0, 0, 1), (1, 0, 0)),
+    "y": ((1, 0, 0), (0, 0, -1), (0, 1, 0)),
+    "z": ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
+    "-x": ((0, 1, 0), (0, 0, -1), (-1, 0, 0)),
+    "-y": ((1, 0, 0), (0, 0, 1), (0, -1, 0)),
+    "-z": ((1, 0, 0), (0, -1, 0), (0, 0, -1)),
+}
+UNKNOWN = ("wall", "free")
+INSET_M = (0.3, 0.3, 0.4)  # of the flight bounds from the geometry's bounding box, when not given
+MAP_MARGIN_M = 0.6  # of the mapped box around the flight bounds: walls just outside are mapped
+MAP_VOXEL_M = 0.1
+MAP_BYTES_PER_VOXEL = 32  # distance, weight, state, nearest obstacle and a copy
+FARTHEST_M = 20_000.0  # beyond it float32 cannot place a surface to a millimetre
+SAMPLE_ATTEMPTS = 100
+
+
+@dataclass(slots=True, kw_only=True)
+class File:
+    """A world read from a file; lengths below are in m in the converted frame, z up.
+
+    Attributes:
+        path: mesh (ply, obj, stl, glb), point cloud (pcd, ply without faces), occupied voxels
+            (npz) or ROS map (yaml); relative to the working directory.
+        unit_m: length of one unit of the file, m.
+        up_axis: which of the file's axes points up: x, y, z, -x, -y or -z.
+        start_m: start [x, y, z]; null: drawn, as the target is, from one connected free part.
+        target_m: target [x, y, z]; null exactly when start_m is.
+        flight_bounds_m: [[x, y, z], [x, y, z]], box the body's centre may not leave; null: the
+            bounding box of the geometry less 0.3 m at the sides and 0.4 m below and above.
+        clearance_m: that the body's centre needs all along a path for it to count, m.
+        flight_height_m: z of a drawn start and target, m.
+        least_distance_m: between a drawn start and target, m.
+        voxel_size_m: of the voxels that a point cloud is turned into, m.
+        wall_height_m: to which a ROS map is extruded from its floor at z = 0, m.
+        unknown: what unknown cells of a ROS map or of voxels with measured free ones are: wall, free.
+        max_map_gib: memory that the map of the flight bounds may need at 0.1 m, GiB.
+    """
+
+    path: str
+    unit_m: float = 1.0
+    up_axis: str = "z"
+    start_m: Sequence[float] | None = None
+    target_m: Sequence[float] | None = None
+    flight_bounds_m: Sequence[Sequence[float]] | None = None
+    clearance_m: float = 0.35
+    flight_height_m: float = 1.2
+    least_distance_m: float = 8.0
+    voxel_size_m: float = 0.1
+    wall_height_m: float = 2.5
+    unknown: str = "wall"
+    max_map_gib: float = 2.0
+
+    def __post_init__(self) -> None:
+        require(bool(self.path), "path must name a world file, got an empty text")
+        require_positive(
+            unit_m=self.unit_m,
+            clearance_m=self.clearance_m,
+            voxel_size_m=self.voxel_size_m,
+            wall_height_m=self.wall_height_m,
+            max_map_gib=self.max_map_gib,
+        )
+        require_non_negative(least_distance_m=self.least_distance_m)
+        require(math.isfinite(self.flight_height_m), f"flight_height_m must be finite, got {self.flight_height_m}")
+        require(self.up_axis in UP_AXES, f"up_axis must be one of {' '.join(UP_AXES)}, got {self.up_axis!r}")
+        require(self.unknown in UNKNOWN, f"unknown must be wall or free, got {self.unknown!r}")
+        require(
+            (self.start_m is None) == (self.target_m is None),
+            "start_m and target_m must be given both or not at all",
+        )
+        if self.start_m is not None and self.target_m is not None:
+            _numbers("start_m", self.start_m, (3,))
+            _numbers("target_m", self.target_m, (3,))
+        if self.flight_bounds_m is not None:
+            low, high = _numbers("flight_bounds_m", self.flight_bounds_m, (2, 3))
+            require(
+                bool((low < high).all()),
+                f"flight_bounds_m must be [[lower x, y, z], [upper x, y, z]], got {low.tolist()} and "
+                f"{high.tolist()}",
+            )
+
+    def generate(self, rng: np.random.Generator) -> World:
+        """Return the world; raise `WorldError` in one line when file or task is unusable."""
+        readers.check_file(Path(self.path))
+        vertices, triangles = self._geometry()
+        flight_bounds = self._checked_bounds(vertices)
+        bounds = flight_bounds + np.array([[-MAP_MARGIN_M], [MAP_MARGIN_M]])
+        self._check_memory(bounds, MAP_VOXEL_M, MAP_BYTES_PER_VOXEL)
+        scene = Scene.from_mesh(vertices, triangles)
+        if self.start_m is not None and self.target_m is not None:
+            start = self._checked_end("start_m", self.start_m, scene, flight_bounds)
+            target = self._checked_end("target_m", self.target_m, scene, flight_bounds)
+        else:
+            start, target = self._drawn_ends(scene, flight_bounds, rng)
+        path = task.shortest_path(scene, flight_bounds, start, target, self.clearance_m)
+        if path.shape[0] == 0:
+            widest = task.bottleneck_m(scene, flight_bounds, start, target, self.clearance_m)
+            raise WorldError(
+                f"{self.path}: target {_text(target)} cannot be reached from start {_text(start)} with "
+                f"clearance_m={self.clearance_m:g}; "
+                + (f"they are joined at {widest:.2f} m" if widest > 0.0 else "they are not joined at all")
+            )
+        return task.assemble(
+            name="file",
+            scene=scene,
+            vertices_m=vertices,
+            triangles=triangles,
+            bounds_m=bounds,
+            flight_bounds_m=flight_bounds,
+            path_m=path,
+        )
+
+    def _geometry(self) -> tuple[Float32, Int32]:
+        """Triangles of the file, in m, z up."""
+        path = Path(self.path)
+        suffix = path.suffix.lower()
+        if suffix in readers.MAPS:
+            require(
+                self.unit_m == 1.0 and self.up_axis == "z",
+                "unit_m and up_axis do not apply to a ROS map, which is in m with z up",
+            )
+            return self._extruded(ros_map.read(path))
+        if suffix in readers.VOXELS:
+            voxels = readers.read_voxels(path)
+            size = voxels.resolution * self.unit_m
+            free = None if voxels.free is None else self._converted(voxels.free)
+            return self._meshed(self._converted(voxels.occupied), free, size)
+        if suffix == ".pcd" or (suffix == ".ply" and readers.ply_counts(path)[1] == 0):
+            points = self._converted(readers.read_cloud(path))
+            points = (np.floor(points / self.voxel_size_m) + 0.5) * self.voxel_size_m
+            return self._meshed(points, None, self.voxel_size_m)
+        vertices, triangles = readers.read_mesh(path)
+        return self._converted(vertices).astype(np.float32), triangles
+
+    def _converted(self, points: Float) -> Float:
+        """Turn the file's up axis to +z and its unit to m; refuse what float32 cannot hold."""
+        points = self.unit_m * (points @ np.array(UP_AXES[self.up_axis], dtype=np.float64).T)
+        farthest = float(np.abs(points).max())
+        if farthest > FARTHEST_M:
+            raise WorldError(
+                f"{self.path}: coordinates reach {farthest:.3g} m, at most {FARTHEST_M:g} m are allowed; "
+                f"is unit_m={self.unit_m:g} right, or has the file a far origin?"
+            )
+        return points
+
+    def _meshed(self, occupied: Float, free: Float | None, size_m: float) -> tuple[Float32, Int32]:
+        """Surface of voxels given by their centres; only the mapped box counts when bounds are given."""
+        if self.flight_bounds_m is not None:
+            low, high = _numbers("flight_bounds_m", self.flight_bounds_m, (2, 3))
+            near = ((occupied > low - MAP_MARGIN_M) & (occupied < high + MAP_MARGIN_M)).all(axis=1)
+            if not near.any():
+                raise WorldError(f"{self.path}: nothing lies within flight_bounds_m; is unit_m right?")
+            occupied = occupied[near]
+            free = None if free is None else free[((free > low) & (free < high)).all(axis=1)]
+        known = occupied if free is None else np.concatenate([occupied, free])
+        corner = known.min(axis=0)
+        self._check_memory(np.stack([corner, known.max(axis=0) + size_m]), size_m, 2)
+        shape = np.rint((known.max(axis=0) - corner) / size_m).astype(np.int64) + 1
+        grid: Bool = np.zeros(shape, dtype=np.bool_)
+        if free is not None and self.unknown == "wall":
+            grid[:] = True
+            grid[tuple(np.rint((free - corner) / size_m).astype(np.int64).T)] = False
+        grid[tuple(np.rint((occupied - corner) / size_m).astype(np.int64).T)] = True
+        return exposed_faces(grid, corner - 0.5 * size_m, np.full(3, size_m))
+
+    def _extruded(self, plan: ros_map.RosMap) -> tuple[Float32, Int32]:
+        """Walls of a map up to `wall_height_m`, with floor and ceiling over its whole extent."""
+        solid = plan.occupied | plan.unknown if self.unknown == "wall" else plan.occupied
+        layers = np.ones((*solid.shape, 3), dtype=np.bool_)
+        layers[..., 1] = solid
+        vertices, triangles = exposed_faces(layers, np.zeros(3), np.array([plan.resolution_m] * 2 + [1.0]))
+        heights = np.array([-0.1, 0.0, self.wall_height_m, self.wall_height_m + 0.1], dtype=np.float32)
+        vertices[:, 2] = heights[np.rint(vertices[:, 2]).astype(np.int64)]
+        c, s = math.cos(plan.yaw_rad), math.sin(plan.yaw_rad)
+        x, y = vertices[:, 0].astype(np.float64), vertices[:, 1].astype(np.float64)
+        vertices[:, 0] = plan.origin_m[0] + c * x - s * y
+        vertices[:, 1] = plan.origin_m[1] + s * x + c * y
+        return vertices, triangles
+
+    def _checked_bounds(self, vertices: Float32) -> Float:
+        box = np.stack([vertices.min(axis=0), vertices.max(axis=0)]).astype(np.float64)
+        if self.flight_bounds_m is None:
+            bounds = box + np.outer([1.0, -1.0], INSET_M)
+            if not (bounds[0] < bounds[1]).all():
+                raise WorldError(
+                    f"{self.path}: the geometry is {_text(box[1] - box[0])} m, too small to fly in; "
+                    f"is unit_m={self.unit_m:g} right?"
+                )
+            return bounds
+        bounds = _numbers("flight_bounds_m", self.flight_bounds_m, (2, 3))
+        if (bounds[0] > box[1]).any() or (bounds[1] < box[0]).any():
+            raise WorldError(
+                f"{self.path}: the geometry reaches from {_text(box[0])} to {_text(box[1])} m, apart from "
+                f"flight_bounds_m {_text(bounds[0])} to {_text(bounds[1])}; are unit_m and up_axis right?"
+            )
+        return bounds
+
+    def _check_memory(self, bounds_m: Float, voxel_m: float, bytes_per_voxel: int) -> None:
+        size = bounds_m[1] - bounds_m[0]
+        gib = float(np.prod(np.ceil(size / voxel_m))) * bytes_per_voxel / 2**30
+        if gib > self.max_map_gib:
+            raise WorldError(
+                f"{self.path}: a map of {_text(size)} m at {voxel_m:g} m would need {gib:.1f} GiB, "
+                f"max_map_gib={self.max_map_gib:g} are allowed; give smaller flight_bounds_m, or is "
+                f"unit_m={self.unit_m:g} wrong?"
+            )
+
+    def _checked_end(self, name: str, given: Sequence[float], scene: Scene, flight_bounds_m: Float) -> Float:
+        point = _numbers(name, given, (3,))
+        if (point < flight_bounds_m[0]).any() or (point > flight_bounds_m[1]).any():
+            raise WorldError(
+                f"{self.path}: {name} {_text(point)} lies outside the flight bounds "
+                f"{_text(flight_bounds_m[0])} to {_text(flight_bounds_m[1])}"
+            )
+        clearance = float(scene.distance_m(point[None])[0])
+        if clearance < self.clearance_m:
+            raise WorldError(
+                f"{self.path}: {name} {_text(point)} lies in or too near an obstacle: its clearance is "
+                f"{clearance:.2f} m, clearance_m={self.clearance_m:g} is needed"
+            )
+        return point
+
+    def _drawn_ends(
+        self, scene: Scene, flight_bounds_m: Float, rng: np.random.Generator
+    ) -> tuple[Float, Float]:
+        """Start and target at the flight height, in the largest free part of that plane."""
+        height = self.flight_height_m
+        if not flight_bounds_m[0, 2] <= height <= flight_bounds_m[1, 2]:
+            raise WorldError(
+                f"{self.path}: flight_height_m={height:g} lies outside the flight bounds, z "
+                f"{flight_bounds_m[0, 2]:g} to {flight_bounds_m[1, 2]:g} m"
+            )
+        points, part, sizes = task.free_layer(scene, flight_bounds_m, height, self.clearance_m)
+        if sizes.size == 0:
+            raise WorldError(
+                f"{self.path}: nowhere at flight_height_m={height:g} has the body's centre "
+                f"clearance_m={self.clearance_m:g} of room"
+            )
+        points = points[part == sizes.argmax()]
+        for _ in range(SAMPLE_ATTEMPTS):
+            start = points[rng.integers(points.shape[0])]
+            far = points[np.linalg.norm(points - start, axis=1) >= self.least_distance_m]
+            if far.shape[0] > 0:
+                return start, far[rng.integers(far.shape[0])]
+        extent = float(np.linalg.norm(np.ptp(points, axis=0)))
+        raise WorldError(
+            f"{self.path}: no two points at flight_height_m={height:g} in the largest free part, "
+            f"{extent:.1f} m across, are least_distance_m={self.least_distance_m:g} apart"
+        )
+
+
+def _numbers(name: str, values: Sequence[object], shape: tuple[int, ...]) -> Float:
+    """Return finite numbers of a shape, or raise `ConfigError`."""
+    try:
+        rows = [list(row) if len(shape) == 2 else row for row in values]  # type: ignore[call-overload]
+        array = np.array(rows, dtype=np.float64)
+    except (TypeError, ValueError):
+        array = np.empty(0)
+    wanted = "[x, y, z]" if shape == (3,) else "[[x, y, z], [x, y, z]]"
+    require(
+        array.shape == shape and bool(np.isfinite(array).all()),
+        f"{name} must be {wanted} of finite numbers, got {values}",
+    )
+    return array
+
+
+def _text(values: Float) -> str:
+    return "[" + ", ".join(f"{value:g}" for value in np.round(values, 3)) + "]"
