@@ -2,13 +2,16 @@
 
 Importing the package loads nothing heavy. It pins every thread pool to one thread, before
 numpy can start them: matrix products change bits between one thread and two, and a
-result must not depend on the machine's core count.
+result must not depend on the machine's core count. It also tells numba which compiled
+kernels are stale (`uavexp.kernel_cache`).
 """
 
 from __future__ import annotations
 
 import os
 from typing import TYPE_CHECKING, Any
+
+from uavexp.kernel_cache import LOCATORS, VARIABLE
 
 if TYPE_CHECKING:
     from uavexp.cli.flight import Trial
@@ -27,6 +30,7 @@ _THREAD_VARIABLES = (
 )
 # overridden, not defaulted: a user's OMP_NUM_THREADS=2 would change results
 os.environ.update(dict.fromkeys(_THREAD_VARIABLES, "1"))
+os.environ[VARIABLE] = ",".join(LOCATORS)
 
 
 def fly(*overrides: str, **values: Any) -> Trial:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from typing import NoReturn
@@ -19,6 +20,9 @@ class _Parser(argparse.ArgumentParser):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command line and return its exit code: 0, 1 a trial raised, 2 bad input, 130 interrupted."""
     os.environ["MPLBACKEND"] = "Agg"
+    # a job started with & ignores SIGINT, and SIGTERM would lose the table of what has flown
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)
     try:
         return _run(_parse(sys.argv[1:] if arguments is None else arguments))
     except UavexpError as error:

@@ -10,7 +10,7 @@ within its stopping distance, holds, and tries again at the explorer's rate.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -117,18 +117,18 @@ class Pilot:
         """Turn the yaw towards the path ahead; return the rate, rad/s."""
         if math.hypot(ahead_m[0], ahead_m[1]) < 0.1:
             return 0.0
-        error_rad = wrap_angle(math.atan2(ahead_m[1], ahead_m[0]) - self.yaw_rad)
+        error_rad = float(wrap_angle(math.atan2(ahead_m[1], ahead_m[0]) - self.yaw_rad))
         rate_radps = min(max(4.0 * error_rad, -self.yaw_rate_radps), self.yaw_rate_radps)
         self.yaw_rad = wrap_angle(self.yaw_rad + rate_radps * step_s)
         return rate_radps
 
     def explore(self, observation: Observation) -> None:
         """Update g*; while without a valid plan, try again."""
-        self._select(observation)
+        self._select(observation, fresh=False)
         if self.trajectory is None and not self.replans:
-            self.request("first", replace(observation, best_goal=self.best_goal))
+            self.request("first", observation)
         elif self.failure and not (self._wait_for_rest and self._moving(observation.time_s)):
-            self.request("retry", replace(observation, best_goal=self.best_goal))
+            self.request("retry", observation)
 
     def decide(self, observation: Observation) -> float:
         """Ask safety and trigger; return the trigger's score."""
@@ -145,11 +145,11 @@ class Pilot:
     def request(
         self, cause: str, observation: Observation, score: float = 0.0, changed_m: Float32 | None = None
     ) -> None:
-        """Plan to g* (or the next best goals); brake when there is no plan."""
+        """Plan to the best goal, else to the next best; brake when there is no plan."""
         if self._pending is not None:
             self.dropped_triggers += 1
             return
-        goal = observation.best_goal
+        goal = self._select(observation, fresh=True)
         for _ in range(_GOALS_PER_REQUEST):
             if goal is None:
                 break
@@ -160,14 +160,14 @@ class Pilot:
                 return
             self.failure = f"{result.status.value}: {result.reason}"
             self.explorer.reject(goal.position_m, observation.time_s)
-            goal = self._select(observation)
+            goal = self._select(observation, fresh=True)
         if goal is None:
             self.failure = self.failure or "no goal is reachable"
         self._brake(observation.time_s, self.failure)
 
-    def _select(self, observation: Observation) -> Goal | None:
+    def _select(self, observation: Observation, *, fresh: bool) -> Goal | None:
         with self.watch.lap("explore"):
-            self.best_goal = self.explorer.select(observation)
+            self.best_goal = self.explorer.select(observation, fresh=fresh)
         return self.best_goal
 
     def _plan(self, observation: Observation, goal: Goal) -> PlanResult:

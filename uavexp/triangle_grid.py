@@ -24,8 +24,7 @@ ALWAYS_LIST_CELLS = 8  # a triangle whose bounding box spans no more is listed w
 class TriangleGrid(NamedTuple):
     """Triangles and, per cell, which of them reach into it."""
 
-    vertices_m: Float  # (V, 3)
-    triangles: Int32  # (F, 3)
+    corners_m: Float  # (F, 3, 3) a triangle's corners in rows
     origin_m: Float  # (3,) lower corner of cell (0, 0, 0)
     cell_m: float
     shape: Int  # (3,)
@@ -35,10 +34,8 @@ class TriangleGrid(NamedTuple):
 
 def build(vertices_m: Float32, triangles: Int32) -> TriangleGrid:
     """Return the grid of a mesh with at least one triangle; the same mesh gives the same grid."""
-    vertices = np.ascontiguousarray(vertices_m, dtype=np.float64)
-    faces = np.ascontiguousarray(triangles, dtype=np.int32)
-    used = vertices[faces.ravel()]
-    low, high = used.min(axis=0), used.max(axis=0)
+    corners = np.ascontiguousarray(vertices_m[triangles], dtype=np.float64)
+    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
     cell = CELL_M
     shape = _shape(low, high, cell)
     while int(np.prod(shape)) > MAX_CELLS:
@@ -46,11 +43,11 @@ def build(vertices_m: Float32, triangles: Int32) -> TriangleGrid:
         shape = _shape(low, high, cell)
     counts = np.zeros(int(np.prod(shape)) + 1, dtype=np.int64)
     nothing = np.empty(0, dtype=np.int32)
-    _list_triangles(vertices, faces, low, cell, shape, counts, nothing)
+    _list_triangles(corners, low, cell, shape, counts, nothing)
     starts = np.cumsum(counts)
     items = np.empty(int(starts[-1]), dtype=np.int32)
-    _list_triangles(vertices, faces, low, cell, shape, starts.copy(), items)
-    return TriangleGrid(vertices, faces, low, cell, shape, starts, items)
+    _list_triangles(corners, low, cell, shape, starts.copy(), items)
+    return TriangleGrid(corners, low, cell, shape, starts, items)
 
 
 def _shape(low: Float, high: Float, cell_m: float) -> Int:
@@ -59,26 +56,22 @@ def _shape(low: Float, high: Float, cell_m: float) -> Int:
 
 @nb.njit(cache=True)
 def _list_triangles(
-    vertices: Float, triangles: Int32, origin: Float, cell: float, shape: Int, cursor: Int, items: Int32
+    corners: Float, origin: Float, cell: float, shape: Int, cursor: Int, items: Int32
 ) -> None:
     """Count per cell into cursor[1:] (no items), or write items where cursor points, advancing it."""
     counting = items.shape[0] == 0
-    corner = np.empty((3, 3))
     centre = np.empty(3)
     half = np.full(3, 0.5 * cell * (1.0 + 1e-9) + 1e-9)
     identity = np.eye(3)
     low = np.empty(3, dtype=np.int64)
     high = np.empty(3, dtype=np.int64)
-    for f in range(triangles.shape[0]):
+    for f in range(corners.shape[0]):
         spans = 1
         for axis in range(3):
-            a = vertices[triangles[f, 0], axis]
-            b = vertices[triangles[f, 1], axis]
-            c = vertices[triangles[f, 2], axis]
+            a, b, c = corners[f, 0, axis], corners[f, 1, axis], corners[f, 2, axis]
             low[axis] = _cell_of(min(a, b, c), origin[axis], cell, shape[axis])
             high[axis] = _cell_of(max(a, b, c), origin[axis], cell, shape[axis])
             spans *= high[axis] - low[axis] + 1
-            corner[0, axis], corner[1, axis], corner[2, axis] = a, b, c
         for i in range(low[0], high[0] + 1):
             for j in range(low[1], high[1] + 1):
                 for k in range(low[2], high[2] + 1):
@@ -86,7 +79,7 @@ def _list_triangles(
                         centre[0] = origin[0] + (i + 0.5) * cell
                         centre[1] = origin[1] + (j + 0.5) * cell
                         centre[2] = origin[2] + (k + 0.5) * cell
-                        if not box_meets_triangle(corner, centre, identity, half):
+                        if not box_meets_triangle(corners[f], centre, identity, half):
                             continue
                     flat = (i * shape[1] + j) * shape[2] + k
                     if counting:
@@ -96,7 +89,7 @@ def _list_triangles(
                         cursor[flat] += 1
 
 
-@nb.njit(cache=True, inline="always")
+@nb.njit(cache=True)
 def _cell_of(coordinate: float, origin: float, cell: float, count: int) -> int:
     return min(max(int(np.floor((coordinate - origin) / cell)), 0), count - 1)
 
@@ -163,15 +156,13 @@ def box_meets_mesh(grid: TriangleGrid, centre: Float, rotation: Float, half: Flo
             or low[axis] > grid.origin_m[axis] + grid.shape[axis] * grid.cell_m
         ):
             return False
-    corner = np.empty((3, 3))
     for i in _cells(grid, low, high, 0):
         for j in _cells(grid, low, high, 1):
             for k in _cells(grid, low, high, 2):
                 flat = (i * grid.shape[1] + j) * grid.shape[2] + k
                 for item in range(grid.starts[flat], grid.starts[flat + 1]):
-                    if _load_if_near(grid, grid.items[item], low, high, corner) and box_meets_triangle(
-                        corner, centre, rotation, half
-                    ):
+                    corner = grid.corners_m[grid.items[item]]
+                    if _is_near(corner, low, high) and box_meets_triangle(corner, centre, rotation, half):
                         return True
     return False
 
@@ -187,21 +178,21 @@ def ball_meets_mesh(grid: TriangleGrid, centre: Float, radius: float) -> bool:
             or low[axis] > grid.origin_m[axis] + grid.shape[axis] * grid.cell_m
         ):
             return False
-    corner = np.empty((3, 3))
     for i in _cells(grid, low, high, 0):
         for j in _cells(grid, low, high, 1):
             for k in _cells(grid, low, high, 2):
                 flat = (i * grid.shape[1] + j) * grid.shape[2] + k
                 for item in range(grid.starts[flat], grid.starts[flat + 1]):
+                    corner = grid.corners_m[grid.items[item]]
                     if (
-                        _load_if_near(grid, grid.items[item], low, high, corner)
+                        _is_near(corner, low, high)
                         and squared_distance_to_triangle(corner, centre) < radius * radius
                     ):
                         return True
     return False
 
 
-@nb.njit(cache=True, inline="always")
+@nb.njit(cache=True)
 def _cells(grid: TriangleGrid, low: Float, high: Float, axis: int) -> range:
     """The cells that an interval covers along one axis."""
     first = _cell_of(low[axis], grid.origin_m[axis], grid.cell_m, grid.shape[axis])
@@ -210,15 +201,12 @@ def _cells(grid: TriangleGrid, low: Float, high: Float, axis: int) -> range:
 
 
 @nb.njit(cache=True)
-def _load_if_near(grid: TriangleGrid, face: int, low: Float, high: Float, corner: Float) -> bool:
-    """Copy a triangle's corners; False when its bounding box misses [low, high]."""
+def _is_near(corner: Float, low: Float, high: Float) -> bool:
+    """Whether a triangle's bounding box meets [low, high]."""
     for axis in range(3):
-        a = grid.vertices_m[grid.triangles[face, 0], axis]
-        b = grid.vertices_m[grid.triangles[face, 1], axis]
-        c = grid.vertices_m[grid.triangles[face, 2], axis]
+        a, b, c = corner[0, axis], corner[1, axis], corner[2, axis]
         if min(a, b, c) > high[axis] or max(a, b, c) < low[axis]:
             return False
-        corner[0, axis], corner[1, axis], corner[2, axis] = a, b, c
     return True
 
 
@@ -257,4 +245,4 @@ def squared_distance_to_triangle(corner: Float, point: Float) -> float:
     else:  # the inside
         v, w = vb / (va + vb + vc), vc / (va + vb + vc)
     x, y, z = apx - v * abx - w * acx, apy - v * aby - w * acy, apz - v * abz - w * acz
-    return x * x + y * y + z * z
+    return float(x * x + y * y + z * z)

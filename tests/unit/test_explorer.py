@@ -39,7 +39,8 @@ def scipy_lengths(passable: np.ndarray, cost: np.ndarray, source: tuple[int, int
                     continue
                 rows.append(i * ny + j)
                 cols.append(a * ny + b)
-                weights.append(math.hypot(di, dj) * 0.5 * (cost[i, j] + cost[a, b]))
+                both = int(cost[i, j]) + int(cost[a, b])
+                weights.append(int(both * math.sqrt(0.5)) if di and dj else both // 2)
     graph = coo_array((weights, (rows, cols)), shape=(nx * ny, nx * ny)).tocsr()
     return dijkstra(graph, indices=source[0] * ny + source[1]).reshape(nx, ny)
 
@@ -48,15 +49,15 @@ def scipy_lengths(passable: np.ndarray, cost: np.ndarray, source: tuple[int, int
 def test_path_lengths_equal_scipys(seed: int) -> None:
     rng = np.random.default_rng(seed)
     passable = rng.random((13, 17)) < 0.7
-    cost = rng.uniform(1.0, 3.0, passable.shape).astype(np.float32)
+    cost = rng.integers(100, 500, passable.shape).astype(np.int32)
     lengths = path_lengths(passable, cost, (3, 4))
-    np.testing.assert_allclose(lengths, scipy_lengths(passable, cost, (3, 4)), rtol=1e-5)
+    np.testing.assert_allclose(lengths, scipy_lengths(passable, cost, (3, 4)) / 100, rtol=1e-5)
 
 
 def test_descent_follows_the_shortest_path_home() -> None:
     passable = np.ones((9, 9), dtype=bool)
     passable[4, :8] = False
-    lengths = path_lengths(passable, np.ones((9, 9), dtype=np.float32), (0, 0))
+    lengths = path_lengths(passable, np.full((9, 9), 100, dtype=np.int32), (0, 0))
     path = descend(lengths, (8, 0))
     assert tuple(path[0]) == (8, 0)
     assert tuple(path[-1]) == (0, 0)

@@ -18,7 +18,7 @@ from uavexp.types import Contact, Outcome, TrialLog, World
 COMMAND = "python -m uavexp strategy=mcr world=warehouse seed=7"
 SHELVES = [([x, y, 0.0], [x + 1.0, y + 4.0, 2.0]) for x in (4.0, 8.0, 12.0, 16.0) for y in (0.5, 7.5)]
 WALLS = [([0.0, -0.1, 0.0], [20.0, 0.0, 3.0]), ([0.0, 12.0, 0.0], [20.0, 12.1, 3.0])]
-BOXES = [*SHELVES, *WALLS, ([10.0, 5.0, 0.0], [10.4, 6.6, 1.8])]
+BOXES = [*SHELVES, *WALLS, ([10.0, 5.6, 0.0], [10.4, 6.8, 1.8])]
 
 
 def weave(times_s):
@@ -42,7 +42,7 @@ def synthetic() -> tuple[World, TrialLog]:
     wall_m = np.array(
         [[x, y, z] for x in np.arange(4.05, 5.0, 0.1) for y in (4.45, 7.55) for z in (1.05, 1.25)]
     )
-    post_m = np.array([[x, y, 1.15] for x in (10.05, 10.35) for y in np.arange(5.05, 6.6, 0.1)])
+    post_m = np.array([[x, y, 1.15] for x in (10.05, 10.35) for y in np.arange(5.65, 6.8, 0.1)])
 
     def replan(time_s, cause, **fields):
         ahead = weave(time_s + np.linspace(0.0, 4.0, 40)) + np.array([0.0, 0.15, 0.0])
@@ -123,6 +123,7 @@ def test_the_plan_keeps_its_proportions_and_shows_all_that_was_flown():
     assert np.all(view[0] >= world.bounds_m[0, :2])
     sheet = page.lay_out((20.0, 8.0))
     plan_view.draw(sheet.plan, world, log, view)
+    sheet.plan.apply_aspect()
     corners = sheet.plan.transData.transform([[0.0, 0.0], [1.0, 1.0]])
     assert corners[1, 0] - corners[0, 0] == pytest.approx(corners[1, 1] - corners[0, 1])
 
@@ -143,7 +144,7 @@ class TestSection:
         assert at(4.5, 2.0) == section.SOLID
         assert at(6.0, 6.0) == section.OPEN
         inner_m2 = np.count_nonzero(plan.cells == section.SOLID) * 0.05**2
-        assert inner_m2 == pytest.approx(8 * 4.0 + 0.4 * 1.6, rel=0.12)
+        assert inner_m2 == pytest.approx(8 * 4.0 + 0.4 * 1.2, rel=0.12)
 
     def test_what_stands_below_or_hangs_above_the_slab_is_not_shown(self):
         low, high = ([6.0, 6.0, 0.0], [7.0, 7.0, 0.6]), ([8.0, 6.0, 1.8], [9.0, 7.0, 3.0])

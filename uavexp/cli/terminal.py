@@ -84,7 +84,7 @@ class Terminal:
     def summary(self, results: Sequence[Result], root: Path) -> None:
         """Print the table of trials, how to repeat them, their pictures and, last, the folder."""
         # as wide as it needs: a cut-off number is worse than a wrapped line
-        self._console.print(_table(results[:_MAX_ROWS]), width=_TABLE_WIDTH, crop=False)
+        Console(file=self._console.file, width=_TABLE_WIDTH).print(_table(results[:_MAX_ROWS]))
         if len(results) > _MAX_ROWS:
             self._say(f"... and {len(results) - _MAX_ROWS} more in trials.parquet")
         for result in results[:_MAX_ROWS]:

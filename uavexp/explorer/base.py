@@ -16,8 +16,11 @@ class Explorer(Protocol):
         """Begin a trial at this flight height."""
         ...
 
-    def select(self, observation: Observation) -> Goal | None:
-        """Return the best goal g* now, or None when no goal is reachable."""
+    def select(self, observation: Observation, *, fresh: bool = False) -> Goal | None:
+        """Return the best goal g* now, or None when no goal is reachable.
+
+        With `fresh` a plan is about to be made: no preference for the goal kept so far.
+        """
         ...
 
     def reject(self, position_m: Float, time_s: float) -> None:

@@ -101,7 +101,7 @@ class Frontier:
     band_below_m: float = 0.2
     band_above_m: float = 0.2
     min_distance_m: float = 0.8
-    commit_m: float = 1.5
+    commit_m: float = 1.0
     hysteresis: float = 2.0
     visited_m: float = 0.5
     set_aside_s: float = 10.0
@@ -112,7 +112,7 @@ class Frontier:
     def __post_init__(self) -> None:
         self.clustering = require_option("clustering", self.clustering, Clustering)
         self.unknown = require_option("unknown", self.unknown, Unknown)
-        require(self.unknown_cost >= 1.0, f"unknown_cost must be >= 1, got {self.unknown_cost}")
+        require(1.0 <= self.unknown_cost <= 5.0, f"unknown_cost must be 1 to 5, got {self.unknown_cost}")
         require_positive(
             rate_hz=self.rate_hz,
             neighbourhood_m=self.neighbourhood_m,
@@ -153,29 +153,35 @@ class Frontier:
         self._aside.append((time_s + self.set_aside_s, position_m))
         self._current = None
 
-    def select(self, observation: Observation) -> Goal | None:
-        """Return g*, or None when neither the target nor any frontier is reachable."""
-        position_m, now_s = observation.state.position_m, observation.time_s
+    def select(self, observation: Observation, *, fresh: bool = False) -> Goal | None:
+        """Return g*, or None when neither the target nor any frontier is reachable.
+
+        With `fresh` the kept goal has no bonus: a plan is made anyway, so the best goal is taken.
+        """
+        now_s = observation.time_s
         self._aside = [entry for entry in self._aside if entry[0] > now_s]
         search = self._search(observation)
-        if self._target_reachable(search, observation):
-            self._current = _target_goal(observation)
-            return self._current
-        current = self._current
-        if current is not None and not current.is_target:
-            distance_m = float(np.linalg.norm(current.position_m - position_m))
-            if distance_m < self.visited_m:
-                self._aside.append((now_s + self.set_aside_s, current.position_m))
-        best = self._best_candidate(search, observation)
-        if current is not None and not current.is_target and not self._is_aside(current.position_m):
-            distance_m = float(np.linalg.norm(current.position_m - position_m))
-            kept = self._score(search, current.position_m, observation.field)
-            # Information is left out of `kept`: what that goal promised is being seen on the way.
-            beaten = best is not None and kept is not None and best.score >= kept.score + self.hysteresis
-            if kept is not None and distance_m > self.commit_m and not beaten:
-                return current
-        self._current = best
-        return best
+        best = self._target(search, observation) or self._best_candidate(search, observation)
+        kept = self._kept(search, observation)
+        bonus = 0.0 if fresh else self.hysteresis
+        # Information is left out of `kept`: what that goal promised is being seen on the way.
+        if kept is None or (best is not None and best.score >= kept.score + bonus):
+            self._current = best
+        return self._current
+
+    def _kept(self, search: _Search, observation: Observation) -> Goal | None:
+        """Score the current goal anew; None when it is near, set aside or not reachable any more."""
+        goal, position_m = self._current, observation.state.position_m
+        if goal is None:
+            return None
+        distance_m = float(np.linalg.norm(goal.position_m - position_m))
+        if goal.is_target:
+            return self._target(search, observation)
+        if distance_m < self.visited_m:
+            self._aside.append((observation.time_s + self.set_aside_s, goal.position_m))
+        if distance_m <= self.commit_m or self._is_aside(goal.position_m):
+            return None
+        return self._score(search, goal.position_m, observation.field)
 
     def _search(self, observation: Observation) -> _Search:
         planar = project(
@@ -188,23 +194,26 @@ class Frontier:
         )
         inside = _inside(planar, observation.flight_bounds_m)
         clear = inside & (planar.clearance > self.min_clearance_m)
-        unit = np.ones(planar.state.shape, dtype=np.float32)
+        unit = np.full(planar.state.shape, 100, dtype=np.int32)
         vehicle = planar.cell_of(observation.state.position_m)
         known = from_vehicle = path_lengths(clear & (planar.state == FREE), unit, vehicle)
         if self.unknown is Unknown.OPTIMISTIC:
-            cost = np.where(planar.state == UNKNOWN, np.float32(self.unknown_cost), unit)
+            dear = np.int32(round(100 * self.unknown_cost))
+            cost = np.where(planar.state == UNKNOWN, dear, unit)
             from_vehicle = path_lengths(clear, cost, vehicle)
         if observation.target_m is None:
             return _Search(planar, inside, known, from_vehicle, None, None)
         target = planar.cell_of(observation.target_m)
         return _Search(planar, inside, known, from_vehicle, path_lengths(clear, unit, target), target)
 
-    def _target_reachable(self, search: _Search, observation: Observation) -> bool:
-        if search.target_cell is None or observation.target_m is None:
-            return False
-        return bool(np.isfinite(search.known[search.target_cell])) and not self._is_aside(
-            observation.target_m
-        )
+    def _target(self, search: _Search, observation: Observation) -> Goal | None:
+        """The mission's target as a goal, None unless known-free cells lead there."""
+        target_m, cell = observation.target_m, search.target_cell
+        if target_m is None or cell is None or self._is_aside(target_m):
+            return None
+        if not np.isfinite(search.known[cell]):
+            return None
+        return Goal(position_m=target_m, is_target=True, score=-self.beta * search.cost_m(cell))
 
     def _best_candidate(self, search: _Search, observation: Observation) -> Goal | None:
         candidates = [
@@ -274,11 +283,6 @@ class Frontier:
 
     def _is_aside(self, point_m: Float) -> bool:
         return any(float(np.linalg.norm(point_m - other)) < self.visited_m for _, other in self._aside)
-
-
-def _target_goal(observation: Observation) -> Goal:
-    assert observation.target_m is not None
-    return Goal(position_m=observation.target_m, is_target=True, score=0.0)
 
 
 def _inside(planar: PlanarMap, bounds_m: Float) -> Bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import heapq
 import math
 
 import numba as nb
@@ -17,36 +16,75 @@ UNKNOWN, FREE = 0, 1  # values of `PlanarMap.state` used here
 _OFFSETS = np.array([(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)], dtype=np.int64)
 
 
-@nb.njit(cache=True)
-def path_lengths(passable: Bool, cost: Float32, source: tuple[int, int]) -> Float32:
-    """Least cost (X, Y) from the source cell over passable cells, 8-connected (Dijkstra 1959).
+_UNIT = 100  # lengths are counted in hundredths of a cell: integers, so buckets serve as queue
+_DIAGONAL = 0.7071067811865476
+_BUCKETS = 1024  # > the longest step, 2 cells of the greatest cost
 
-    A step costs its length in cells times the mean of both cells' `cost`. No corner is
-    cut: a diagonal step needs both of its side cells passable. Unreached cells are inf.
-    The source is expanded even if it is not passable itself.
+
+@nb.njit(cache=True)
+def path_lengths(passable: Bool, cost: Int32, source: tuple[int, int]) -> Float32:
+    """Least cost (X, Y), in cells, from the source over passable cells, 8-connected.
+
+    A straight step costs the mean of both cells' `cost` (hundredths, 100 to 500), a
+    diagonal one sqrt(2) times that, rounded down to hundredths; no corner is cut: a diagonal
+    step needs both of its side cells passable. Unreached cells are inf. The source is
+    expanded even if it is not passable itself. Dijkstra (1959) with Dial's (1969) buckets.
     """
     nx, ny = passable.shape
-    length = np.full((nx, ny), np.inf, dtype=np.float32)
-    length[source] = 0.0
-    queue = [(np.float32(0.0), source[0] * ny + source[1])]
-    while queue:
-        here, flat = heapq.heappop(queue)
-        i, j = flat // ny, flat % ny
-        if here > length[i, j]:
+    far = np.int32(2**31 - 1)
+    length = np.full(nx * ny, far, dtype=np.int32)
+    following = np.full(nx * ny, -1, dtype=np.int32)  # bucket lists, doubly linked
+    previous = np.full(nx * ny, -1, dtype=np.int32)
+    head = np.full(_BUCKETS, -1, dtype=np.int32)
+    start = source[0] * ny + source[1]
+    length[start] = 0
+    head[0] = start
+    waiting, now = 1, 0
+    while waiting > 0:
+        slot = now % _BUCKETS
+        flat = head[slot]
+        if flat < 0:
+            now += 1
             continue
+        head[slot] = following[flat]
+        if following[flat] >= 0:
+            previous[following[flat]] = -1
+        waiting -= 1
+        i, j = flat // ny, flat % ny
         for n in range(8):
             di, dj = _OFFSETS[n, 0], _OFFSETS[n, 1]
             a, b = i + di, j + dj
             if not (0 <= a < nx and 0 <= b < ny) or not passable[a, b]:
                 continue
-            if di != 0 and dj != 0 and not (passable[a, j] and passable[i, b]):
+            both = cost[i, j] + cost[a, b]
+            if di != 0 and dj != 0:
+                if not (passable[a, j] and passable[i, b]):
+                    continue
+                step = int(both * _DIAGONAL)
+            else:
+                step = both // 2
+            near, there = a * ny + b, now + step
+            if there >= length[near]:
                 continue
-            step = math.sqrt(2.0) if di != 0 and dj != 0 else 1.0
-            there = np.float32(here + step * 0.5 * (cost[i, j] + cost[a, b]))
-            if there < length[a, b]:
-                length[a, b] = there
-                heapq.heappush(queue, (there, a * ny + b))
-    return length
+            if length[near] != far:  # already waiting: take it out of its bucket
+                if previous[near] >= 0:
+                    following[previous[near]] = following[near]
+                else:
+                    head[length[near] % _BUCKETS] = following[near]
+                if following[near] >= 0:
+                    previous[following[near]] = previous[near]
+                waiting -= 1
+            length[near] = there
+            slot = there % _BUCKETS
+            previous[near], following[near] = -1, head[slot]
+            if head[slot] >= 0:
+                previous[head[slot]] = near
+            head[slot] = near
+            waiting += 1
+    cells = np.empty((nx, ny), dtype=np.float32)
+    for flat in range(nx * ny):
+        cells[flat // ny, flat % ny] = np.inf if length[flat] == far else length[flat] / _UNIT
+    return cells
 
 
 @nb.njit(cache=True)

@@ -30,7 +30,7 @@ class TargetOnly:
         """Set the target aside for `set_aside_s`."""
         self._until_s = time_s + self.set_aside_s
 
-    def select(self, observation: Observation) -> Goal | None:
+    def select(self, observation: Observation, *, fresh: bool = False) -> Goal | None:
         """Return the target; None while it is set aside or when the mission has none."""
         target_m = observation.target_m
         if target_m is None or observation.time_s < self._until_s:

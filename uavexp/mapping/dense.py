@@ -16,6 +16,7 @@ import numba as nb
 import numpy as np
 
 from uavexp.mapping.base import DistanceField
+from uavexp.mapping.frustum import column_depths, frustum_box
 from uavexp.mapping.occupancy import OccupancyMap, Rule, enlist, judge, keeps_free
 from uavexp.mapping.parameters import MapParameters
 from uavexp.types import Float, Float32, Int32, MapUpdate, Scan, UInt8
@@ -35,36 +36,34 @@ def _clip(low: float, high: float, constant: float, slope: float) -> tuple[float
     return low, high
 
 
-@nb.njit(cache=True)
-def column_depths(depth: Float32) -> Float:
-    """Farthest measurement in each pixel column (W,), -inf where there is none."""
-    height, width = depth.shape
-    farthest = np.full(width, -np.inf)
-    for v in range(height):
-        for u in range(width):
-            if depth[v, u] > farthest[u]:
-                farthest[u] = depth[v, u]
-    return farthest
+@nb.njit(cache=True, inline="always")
+def _visible_part(
+    count: int, x: float, dx: float, y: float, dy: float, z: float, dz: float,
+    width: int, height: int, farthest: Float, range_m: float, truncation_m: float,
+) -> tuple[int, int]:  # fmt: skip
+    """First and last voxel k of a column that may be updated; first > last when there is none.
 
-
-@nb.njit(cache=True)
-def frustum_box(
-    intrinsics: Float, height: int, width: int, range_m: float, rotation: Float, position: Float
-) -> Float:
-    """Bounding box (2, 3) of the view frustum up to depth `range_m`, in the frame of the pose."""
-    box = np.empty((2, 3))
-    box[0], box[1] = position, position
-    for u in (-0.5, width - 0.5):
-        for v in (-0.5, height - 0.5):
-            x = (u - intrinsics[2]) / intrinsics[0] * range_m
-            y = (v - intrinsics[3]) / intrinsics[1] * range_m
-            for axis in range(3):
-                at = position[axis] + (
-                    rotation[axis, 0] * x + rotation[axis, 1] * y + rotation[axis, 2] * range_m
-                )
-                box[0, axis] = min(box[0, axis], at)
-                box[1, axis] = max(box[1, axis], at)
-    return box
+    Voxel k lies at depth z + k dz and projects to u + 0.5 = (x + k dx) / (z + k dz), likewise v.
+    """
+    low, high = _clip(0.0, count - 1.0, z - _NEAR_M, dz)
+    low, high = _clip(low, high, range_m - z, -dz)
+    low, high = _clip(low, high, x, dx)
+    low, high = _clip(low, high, width * z - x, width * dz - dx)
+    low, high = _clip(low, high, y, dy)
+    low, high = _clip(low, high, height * z - y, height * dz - dy)
+    if low > high:
+        return 1, 0
+    # nothing behind the farthest surface in the pixel columns it crosses (u is monotonic in k)
+    u_low, u_high = (x + low * dx) / (z + low * dz), (x + high * dx) / (z + high * dz)
+    first_u = max(int(min(u_low, u_high) - 1e-6), 0)
+    last_u = min(int(max(u_low, u_high) + 1e-6), width - 1)
+    reach = -np.inf
+    for u in range(first_u, last_u + 1):
+        reach = max(reach, farthest[u])
+    low, high = _clip(low, high, reach + truncation_m - z, -dz)
+    if low > high:
+        return 1, 0
+    return int(np.ceil(low)), int(np.floor(high))
 
 
 @nb.njit(cache=True)
@@ -94,52 +93,39 @@ def integrate_scan(
     """
     height, width = depth.shape
     nx, ny, nz = shape
-    fx, fy, cx, cy = intrinsics
-    farthest_m = max_range_m + rule.truncation_m
+    fx, fy = intrinsics[0], intrinsics[1]
+    right, down = intrinsics[2] + 0.5, intrinsics[3] + 0.5  # pixel u spans [u, u + 1) with these
+    range_m = max_range_m + rule.truncation_m
     farthest = column_depths(depth)
-    box = frustum_box(intrinsics, height, width, farthest_m, rotation, position_m)
-    low_x = max(int(np.floor((box[0, 0] - origin_m[0]) / voxel_m - 0.5)), 0)
-    high_x = min(int(np.ceil((box[1, 0] - origin_m[0]) / voxel_m - 0.5)), nx - 1)
-    low_y = max(int(np.floor((box[0, 1] - origin_m[1]) / voxel_m - 0.5)), 0)
-    high_y = min(int(np.ceil((box[1, 1] - origin_m[1]) / voxel_m - 0.5)), ny - 1)
+    corner = (position_m - origin_m) / voxel_m - 0.5  # the camera in voxels, counted between centres
+    box = frustum_box(intrinsics, height, width, range_m / voxel_m, rotation, corner)
+    low_x, high_x = max(int(np.ceil(box[0, 0])), 0), min(int(np.floor(box[1, 0])), nx - 1)
+    low_y, high_y = max(int(np.ceil(box[0, 1])), 0), min(int(np.floor(box[1, 1])), ny - 1)
     reciprocal = 1.0 / np.arange(1, rule.max_weight + 2)
-    # camera coordinates of voxel k of a column: base + k * step
-    step_x, step_y, step_z = rotation[2, 0] * voxel_m, rotation[2, 1] * voxel_m, rotation[2, 2] * voxel_m
-    offset_z = origin_m[2] + 0.5 * voxel_m - position_m[2]
+    # camera axes in metres a voxel; the image's two turned into pixels times depth
+    forward = rotation[:, 2] * voxel_m
+    rightward = rotation[:, 0] * (voxel_m * fx) + right * forward
+    downward = rotation[:, 1] * (voxel_m * fy) + down * forward
     for i in range(low_x, high_x + 1):
-        offset_x = origin_m[0] + (i + 0.5) * voxel_m - position_m[0]
         for j in range(low_y, high_y + 1):
-            offset_y = origin_m[1] + (j + 0.5) * voxel_m - position_m[1]
-            base_x = rotation[0, 0] * offset_x + rotation[1, 0] * offset_y + rotation[2, 0] * offset_z
-            base_y = rotation[0, 1] * offset_x + rotation[1, 1] * offset_y + rotation[2, 1] * offset_z
-            base_z = rotation[0, 2] * offset_x + rotation[1, 2] * offset_y + rotation[2, 2] * offset_z
-            low, high = _clip(0.0, nz - 1.0, base_z - _NEAR_M, step_z)
-            low, high = _clip(low, high, farthest_m - base_z, -step_z)
-            low, high = _clip(low, high, fx * base_x + (cx + 0.5) * base_z, fx * step_x + (cx + 0.5) * step_z)
-            right = cx - width + 0.5
-            low, high = _clip(low, high, -fx * base_x - right * base_z, -fx * step_x - right * step_z)
-            low, high = _clip(low, high, fy * base_y + (cy + 0.5) * base_z, fy * step_y + (cy + 0.5) * step_z)
-            bottom = cy - height + 0.5
-            low, high = _clip(low, high, -fy * base_y - bottom * base_z, -fy * step_y - bottom * step_z)
-            if low > high:
-                continue
-            # nothing behind the farthest surface of the pixel columns it crosses
-            u_low = fx * (base_x + low * step_x) / (base_z + low * step_z) + cx
-            u_high = fx * (base_x + high * step_x) / (base_z + high * step_z) + cx
-            reach = -np.inf
-            for u in range(max(int(min(u_low, u_high)), 0), min(int(max(u_low, u_high)) + 2, width)):
-                reach = max(reach, farthest[u])
-            low, high = _clip(low, high, reach + rule.truncation_m - base_z, -step_z)
+            ox, oy, oz = i - corner[0], j - corner[1], -corner[2]
+            x = rightward[0] * ox + rightward[1] * oy + rightward[2] * oz
+            y = downward[0] * ox + downward[1] * oy + downward[2] * oz
+            z = forward[0] * ox + forward[1] * oy + forward[2] * oz
+            first, last = _visible_part(
+                nz, x, rightward[2], y, downward[2], z, forward[2],
+                width, height, farthest, range_m, rule.truncation_m,
+            )  # fmt: skip
             column = (i * ny + j) * nz
-            for k in range(int(np.ceil(low)), int(np.floor(high)) + 1):
-                z = base_z + k * step_z
-                inverse = 1.0 / z
-                u = int(fx * (base_x + k * step_x) * inverse + cx + 0.5)
-                v = int(fy * (base_y + k * step_y) * inverse + cy + 0.5)
+            for k in range(first, last + 1):
+                depth_m = z + k * forward[2]
+                inverse = 1.0 / depth_m
+                u = int((x + k * rightward[2]) * inverse)
+                v = int((y + k * downward[2]) * inverse)
                 if u >= width or v >= height:
                     continue
-                observed = depth[v, u] - z
-                if not observed >= -rule.truncation_m or (z > max_range_m and observed > 0.0):
+                observed = depth[v, u] - depth_m
+                if not observed >= -rule.truncation_m or (depth_m > max_range_m and observed > 0.0):
                     continue
                 observed = min(observed, rule.truncation_m)
                 at = column + k
@@ -148,7 +134,7 @@ def integrate_scan(
                     continue
                 fused = (had * before + observed) * reciprocal[had]
                 tsdf[at] = fused
-                weight[at] = min(had + 1, rule.max_weight)
+                weight[at] = np.uint8(had + (had < rule.max_weight))
                 after = judge(observed, before, had, fused, byte, rule)
                 if after != byte:
                     count = enlist(at, after, live, state, changes, count)

@@ -53,8 +53,8 @@ def _any_equal_raised(target: Int16, old: Int16, new: Int16, add: int) -> bool:
     offset = np.int16(add)
     hit = np.int16(0)
     for k in range(target.shape[0]):
-        hit |= np.int16((new[k] > old[k]) & (target[k] == np.int16(old[k] + offset)))
-    return hit != 0
+        hit = np.int16(hit | ((new[k] > old[k]) & (target[k] == np.int16(old[k] + offset))))
+    return bool(hit)
 
 
 @nb.njit(cache=True)
@@ -66,15 +66,17 @@ def _largest(run: Int16) -> int:
 
 
 @nb.njit(cache=True)
-def _compare(new: Int16, old: Int16, cap: int) -> tuple[int, int]:
-    """Smallest value that fell and smallest old value that rose; cap + 1 when none did."""
+def _compare(new: Int16, old: Int16, cap: int) -> tuple[int, int, int]:
+    """Smallest value that fell and smallest old value that rose (cap + 1 when none did), largest value."""
     fell = np.int16(cap + 1)
     rose = np.int16(cap + 1)
     none = np.int16(cap + 1)
+    largest = np.int16(0)
     for k in range(new.shape[0]):
         fell = min(fell, new[k] if new[k] < old[k] else none)
         rose = min(rose, old[k] if new[k] > old[k] else none)
-    return int(fell), int(rose)
+        largest = max(largest, new[k])
+    return int(fell), int(rose), int(largest)
 
 
 @nb.njit(cache=True)
@@ -110,7 +112,7 @@ def _runs(columns: Int32, wanted: UInt8, first: int, last: int, runs: Int32) -> 
 
 @nb.njit(cache=True)
 def _recompute_run(
-    target: Int16, source: Int16, begin: int, end: int, stride: int, limit: int, length: int, cap: int
+    target: Int16, source: Int16, begin: int, end: int, stride: int, limit: int, length: int
 ) -> int:
     """Compute flat target[begin:end] anew as the min over source shifted by whole strides.
 
@@ -130,7 +132,7 @@ def _recompute_run(
         if offset & (offset - 1) == 0:  # looking at 1, 2, 4, 8 ... is enough to stop early
             largest = _largest(out)
         offset += 1
-    return _largest(out)
+    return int(_largest(out))
 
 
 @nb.njit(cache=True)
@@ -149,7 +151,7 @@ def _stage_z(
                 continue
             here = g[column * nz : (column + 1) * nz]
             _scan_column(state[column * nz : (column + 1) * nz], to_occupied, cap, fresh)
-            fell[count], rose[count] = _compare(fresh, here, cap)
+            fell[count], rose[count], _ = _compare(fresh, here, cap)
             if fell[count] <= cap or rose[count] <= cap:
                 columns[count] = column
                 old[count * nz : (count + 1) * nz] = here
@@ -160,11 +162,14 @@ def _stage_z(
 
 @nb.njit(cache=True)
 def _stage_y(
-    shape: tuple[int, int, int], cap: int, bound: int, g: Int16, h: Int16,
+    shape: tuple[int, int, int], cap: int, peak: Int16, g: Int16, h: Int16,
     count_in: int, columns_in: Int32, old_in: Int16, fell_in: Int32, rose_in: Int32,
     columns: Int32, old: Int16, fell: Int32, rose: Int32,
-) -> tuple[int, int]:  # fmt: skip
-    """Carry the changed columns of g into h, plane by plane; list the columns of h that changed."""
+) -> int:  # fmt: skip
+    """Carry the changed columns of g into h, plane by plane; list the columns of h that changed.
+
+    `peak` holds for each column of h an upper bound, beyond which no offset can matter to it.
+    """
     _, ny, nz = shape
     count = 0
     before = np.empty(ny * nz, np.int16)
@@ -179,9 +184,11 @@ def _stage_y(
         while last < count_in and columns_in[last] // ny == x:
             last += 1
         plane = x * ny
-        reach = int(math.sqrt(bound)) if bound > 0 else 0
-        low = max(columns_in[first] - plane - reach, 0)
-        high = min(columns_in[last - 1] - plane + reach + 1, ny)
+        first_y, last_y = columns_in[first] - plane, columns_in[last - 1] - plane
+        widest = int(math.sqrt(cap))
+        bound = _largest(peak[plane + max(first_y - widest, 0) : plane + min(last_y + widest + 1, ny)])
+        reach = int(math.sqrt(bound))
+        low, high = max(first_y - reach, 0), min(last_y + reach + 1, ny)
         before[low * nz : high * nz] = h[(plane + low) * nz : (plane + high) * nz]
         total = _runs(columns_in, wanted, first, last, runs)
         for n in range(total):
@@ -200,7 +207,7 @@ def _stage_y(
             was = old_in[n * nz : (n + 1) * nz]
             for y in range(low, high):
                 offset = columns_in[n] - plane - y
-                if marked[y] == 0 and offset * offset + rose_in[n] <= bound:
+                if marked[y] == 0 and offset * offset + rose_in[n] <= peak[plane + y]:
                     here = h[(plane + y) * nz : (plane + y + 1) * nz]
                     if _any_equal_raised(here, was, new, offset * offset):
                         marked[y] = 1
@@ -208,18 +215,18 @@ def _stage_y(
             total = _runs(rows, marked, low, high, runs)
             for n in range(total):
                 begin, end = (plane + runs[n, 0]) * nz, (plane + runs[n, 1]) * nz
-                bound = max(bound, _recompute_run(h, g, begin, end, nz, plane * nz, ny * nz, cap))
+                _recompute_run(h, g, begin, end, nz, plane * nz, ny * nz)
             marked[low:high] = 0
         for y in range(low, high):
             new = h[(plane + y) * nz : (plane + y + 1) * nz]
             was = before[y * nz : (y + 1) * nz]
-            fell[count], rose[count] = _compare(new, was, cap)
+            fell[count], rose[count], peak[plane + y] = _compare(new, was, cap)
             if fell[count] <= cap or rose[count] <= cap:
                 columns[count] = plane + y
                 old[count * nz : (count + 1) * nz] = was
                 count += 1
         first = last
-    return count, bound
+    return count
 
 
 @nb.njit(cache=True)
@@ -279,7 +286,7 @@ def _stage_x(
         total = _runs(rows, marked[x * ny : (x + 1) * ny], low, high, runs)
         for n in range(total):
             begin, end = x * plane + runs[n, 0] * nz, x * plane + runs[n, 1] * nz
-            bound = max(bound, _recompute_run(f, h, begin, end, plane, 0, nx * plane, cap))
+            bound = max(bound, _recompute_run(f, h, begin, end, plane, 0, nx * plane))
         marked[x * ny + low : x * ny + high] = 0
     return bound
 
@@ -299,11 +306,12 @@ def _count_changed(
             was, fresh = published[begin : begin + nz], seen[begin : begin + nz]
             changed = np.int16(0)
             for k in range(nz):
-                changed += np.int16((np.int16(far[k] - near[k]) != was[k]) | (fresh[k] != 0))
+                differs = (np.int16(far[k] - near[k]) != was[k]) | (fresh[k] != 0)
+                changed = np.int16(changed + differs)
             if changed > 0:
                 columns[count] = x * ny + y
                 count += 1
-                total += changed
+                total += int(changed)
         touched[x, 0] = ny
         touched[x, 1] = 0
     return count, total
@@ -318,7 +326,7 @@ def _emit(
     """Publish the new distances of the listed columns and write the change log (with one spare row)."""
     nz = distance.shape[2]
     beyond = np.float32(max_distance_m)
-    count = 0
+    count = np.uint64(0)  # unsigned: numba then leaves out the test for negative indices
     flat = distance.reshape(-1)
     for n in range(columns.shape[0]):
         begin = columns[n] * nz
@@ -326,16 +334,17 @@ def _emit(
         was, fresh, metres = published[begin : begin + nz], seen[begin : begin + nz], flat[begin : begin + nz]
         for k in range(nz):  # every row is written, and kept when the voxel changed: no branches
             value = np.int16(far[k] - near[k])
-            after = table[value + cap]
+            after = table[np.uint64(value + cap)]
             voxel[count] = begin + k
             old[count] = beyond if fresh[k] else metres[k]
             new[count] = after
             first_seen[count] = fresh[k]
             occupied[count] = near[k] > 0
-            count += (value != was[k]) | (fresh[k] != 0)
+            count += np.uint64((value != was[k]) | (fresh[k] != 0))
             metres[k] = after
-            was[k] = value
-            fresh[k] = 0
+        for k in range(nz):
+            was[k] = np.int16(far[k] - near[k])
+        fresh[:] = 0
 
 
 @nb.njit(cache=True)
@@ -390,8 +399,8 @@ class _Stages:
     """The three stages of one transform, towards occupied or towards other voxels."""
 
     to_occupied: bool
-    bound_y: int  # upper bounds of the stored values: nothing propagates further than these
-    bound_x: int
+    peak_y: Int16  # (X * Y,) upper bounds of the columns of `along_y`: nothing propagates further
+    bound_x: int  # upper bound of all of `along_x`
     along_z: Int16  # (X * Y * Z,) flat, as the two below
     along_y: Int16
     along_x: Int16
@@ -414,8 +423,8 @@ class SignedDistance:
         self.max_distance_m = max_distance_m
         self.cap, self._table = distance_table(voxel_size_m, max_distance_m)
         self.distance: Float32 = np.full(shape, max_distance_m, np.float32)
-        self._outside = self._stages(True, self.cap, size)
-        self._inside = self._stages(False, 0, size)
+        self._outside = self._stages(True, self.cap, shape)
+        self._inside = self._stages(False, 0, shape)
         self._published = np.full(size, self.cap, np.int16)
         self._seen = np.zeros(size, np.uint8)
         self._flagged = np.zeros(nx * ny, np.uint8)
@@ -424,9 +433,10 @@ class SignedDistance:
         self._changed = [self._columns(nx * ny, nz) for _ in range(2)]
 
     @staticmethod
-    def _stages(to_occupied: bool, start: int, size: int) -> _Stages:
-        along = [np.full(size, start, np.int16) for _ in range(3)]
-        return _Stages(to_occupied, start, start, *along)
+    def _stages(to_occupied: bool, start: int, shape: tuple[int, int, int]) -> _Stages:
+        peak = np.full(shape[0] * shape[1], start, np.int16)
+        along = [np.full(peak.size * shape[2], start, np.int16) for _ in range(3)]
+        return _Stages(to_occupied, peak, start, *along)
 
     @staticmethod
     def _columns(count: int, depth: int) -> tuple[Int32, Int16, Int32, Int32]:
@@ -487,8 +497,8 @@ class SignedDistance:
         count = _stage_z(
             state, self._flagged, box, self.shape, stages.to_occupied, self.cap, stages.along_z, *first
         )
-        count, stages.bound_y = _stage_y(
-            self.shape, self.cap, stages.bound_y, stages.along_z, stages.along_y, count, *first, *second
+        count = _stage_y(
+            self.shape, self.cap, stages.peak_y, stages.along_z, stages.along_y, count, *first, *second
         )
         stages.bound_x = _stage_x(
             self.shape, self.cap, stages.bound_x, stages.along_y, stages.along_x, count, *second,

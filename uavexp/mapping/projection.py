@@ -107,7 +107,7 @@ def project(
 
     def layer(height_m: float, slack: float) -> int:
         index = math.floor((height_m - float(field.origin_m[2])) / voxel_m + slack)
-        return min(max(index, 0), nz - 1)
+        return int(min(max(index, 0), nz - 1))
 
     shape = tuple(max(1, math.ceil(count * voxel_m / cell_m - 1e-6)) for count in (nx, ny))
     clearance = np.empty(shape, np.float32)

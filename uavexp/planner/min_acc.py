@@ -13,7 +13,9 @@ times a margin; taken first from the smoothed path, then from the optimised curv
 spline cannot keep the limits in that time (it cannot jump in acceleration), it is stretched.
 
 Clearance: hard, checked every half voxel on the result. When it fails, the next rung of a fixed
-ladder makes obstacles dearer, the flight slower and ties the curve to the path.
+ladder makes obstacles dearer, the flight slower and the spline finer. When a moving start
+defeats that, the vehicle is braked first and the rest planned from where it stands, with rungs
+that also tie the curve to the path; brake and flight are one trajectory.
 
 Left out: yaw; the cost per metre (c is per second, as in the paper); moving obstacles.
 All budgets are iterations; the answer depends on the request and nothing else.
@@ -22,24 +24,30 @@ All budgets are iterations; the answer depends on the request and nothing else.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from uavexp.errors import require, require_non_negative, require_positive
-from uavexp.planner.optimise import Settings, optimise
+from uavexp.geometry import evaluate, sample_times
+from uavexp.planner.brake import braking_trajectory
+from uavexp.planner.optimise import CONTROL_POINTS, Settings, optimise, shortfall
 from uavexp.planner.search import PathSearch
-from uavexp.planner.spline import to_trajectory
+from uavexp.planner.spline import join, spline_model, to_trajectory
 from uavexp.types import Limits, PlanRequest, PlanResult, PlanStatus
+
+_MENDED_BY_BRAKING = (PlanStatus.NOT_CLEAR, PlanStatus.LIMITS, PlanStatus.SOLVER)
+_REST_MPS = 0.05  # a slower start counts as standing
+_BRAKE_CHECK_S = 0.02
 
 
 @dataclass(slots=True, kw_only=True)
 class MinAcc:
     """Minimum-acceleration B-spline through the mapped space, on an A* path."""
 
-    min_clearance_m: float = 0.28
+    min_clearance_m: float = 0.26
     safe_clearance_m: float = 0.75
-    obstacle_weight: float = 20.0
+    obstacle_weight: float = 60.0
     end_speed_mps: float = 1.5
     duration_margin: float = 1.1
     control_spacing_m: float = 0.6
@@ -50,6 +58,7 @@ class MinAcc:
     z_band_m: float = 0.3
     unknown: str = "optimistic"
     max_expansions: int = 300_000
+    _limits: Limits | None = field(default=None, init=False, repr=False)
     _settings: Settings | None = field(default=None, init=False, repr=False)
     _search: PathSearch | None = field(default=None, init=False, repr=False)
 
@@ -88,6 +97,9 @@ class MinAcc:
     def reset(self, limits: Limits, rng: np.random.Generator) -> None:
         """Begin a trial of a vehicle with these limits; draws nothing."""
         del rng
+        for count in CONTROL_POINTS:
+            spline_model(count)  # cached: no request pays for it
+        self._limits = limits
         self._settings = Settings(
             min_clearance=self.min_clearance_m,
             safe_clearance=self.safe_clearance_m,
@@ -98,6 +110,7 @@ class MinAcc:
             first_iterations=self.first_iterations,
             final_iterations=self.final_iterations,
             tolerance=self.tolerance,
+            z_band=self.z_band_m,
             known_only=self.unknown == "conservative",
             max_speed=limits.max_speed_mps,
             max_acceleration=limits.max_acceleration_mps2,
@@ -115,9 +128,17 @@ class MinAcc:
         """Return a trajectory or the reason why there is none (`Planner.plan`)."""
         if self._settings is None or self._search is None:
             raise RuntimeError("plan() needs reset() first")
+        result = self._attempt(request, self._settings, self._search)
+        speed = float(np.linalg.norm(request.velocity_mps))
+        if result.status in _MENDED_BY_BRAKING and speed > _REST_MPS:
+            return self._brake_first(request, result)
+        return result
+
+    def _attempt(self, request: PlanRequest, settings: Settings, search: PathSearch) -> PlanResult:
+        """Search and optimise once."""
         began = time.perf_counter()
         goal_m = request.goal.position_m
-        found = self._search.find(request.field, request.position_m, goal_m, request.flight_bounds_m)
+        found = search.find(request.field, request.position_m, goal_m, request.flight_bounds_m)
         searched = time.perf_counter()
         if found.status is not PlanStatus.OK:
             return PlanResult(
@@ -126,7 +147,7 @@ class MinAcc:
                 expansions=found.expansions,
                 wall_search_s=searched - began,
             )
-        status, reason, curve, iterations = optimise(request, found.path_m, self._settings)
+        status, reason, curve, iterations = optimise(request, found.path_m, settings)
         trajectory = None
         if curve is not None:
             trajectory = to_trajectory(curve.control, curve.h, request.time_s, request.goal.is_target)
@@ -139,4 +160,38 @@ class MinAcc:
             expansions=found.expansions,
             wall_search_s=searched - began,
             wall_optimise_s=time.perf_counter() - searched,
+        )
+
+    def _brake_first(self, request: PlanRequest, failed: PlanResult) -> PlanResult:
+        """Stop, then fly from there; the failure of the direct attempt when that fails, too."""
+        settings, search, limits = self._settings, self._search, self._limits
+        if settings is None or search is None or limits is None:
+            raise RuntimeError("plan() needs reset() first")
+        brake = braking_trajectory(
+            request.time_s, request.position_m, request.velocity_mps, request.acceleration_mps2, limits
+        )
+        way = evaluate(brake, sample_times(brake, brake.start_s, _BRAKE_CHECK_S))[0]
+        if shortfall(request, settings, way):
+            return failed
+        standing = replace(
+            request,
+            time_s=brake.end_s,
+            position_m=way[-1],
+            velocity_mps=np.zeros(3),
+            acceleration_mps2=np.zeros(3),
+        )
+        onward = self._attempt(standing, settings, search)
+        spent = replace(
+            failed,
+            iterations=failed.iterations + onward.iterations,
+            expansions=failed.expansions + onward.expansions,
+            wall_search_s=failed.wall_search_s + onward.wall_search_s,
+            wall_optimise_s=failed.wall_optimise_s + onward.wall_optimise_s,
+        )
+        if onward.trajectory is None:
+            return spent
+        joined = join(brake, onward.trajectory)
+        path = np.concatenate([request.position_m[None], onward.path_m])
+        return replace(
+            spent, status=PlanStatus.OK, trajectory=joined, path_m=path, reason="brakes first"
         )

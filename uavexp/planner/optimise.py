@@ -9,7 +9,7 @@ import daqp
 import numpy as np
 
 from uavexp.mapping.base import DistanceField
-from uavexp.planner.scp import line_search, limit_rows, quadratic_model
+from uavexp.planner.scp import limit_rows, line_search, quadratic_model
 from uavexp.planner.spline import (
     SAMPLES,
     SplineModel,
@@ -22,16 +22,18 @@ from uavexp.planner.spline import (
 from uavexp.planner.timing import STEP_M, place_by_time, resample, smooth, time_profile
 from uavexp.types import Float, PlanRequest, PlanStatus
 
-_FEWEST, _MOST = 10, 30  # control points
+CONTROL_POINTS = range(10, 41, 2)  # the numbers that are used
 _SMOOTHING_ROUNDS = 10  # takes the staircase out of a voxel path
 _TANGENT_M = 0.5  # length over which the path's first and last direction is taken
 _START_EXCESS = 1.1  # a start beyond a limit by more than this factor is refused
-_QP_SHARE = 0.985  # of the limits inside the QP: room for its linearisation
-_STRETCHES = 8
+_QP_SHARE = 0.96  # of the limits inside the QP: room for its linearisation
 _STRETCH = 1.06  # least factor by which a duration is stretched
+_STRETCH_GAIN = 0.99  # stretching ends unless it takes the excess below this share
 _RETIME = 0.03  # relative change of duration that is worth placing the control points anew
 _HARD_ABOVE_VOXELS = 0.5  # the steep part of the obstacle cost begins this far above the hard limit
 _START_SLACK_M = 0.01  # by which a start below the hard limit may come closer still
+_REST_MPS = 0.05  # a slower start counts as standing
+_UNKNOWN_TETHER = 400.0  # of samples in unknown space, when that is not to be entered
 
 
 class Rung(NamedTuple):
@@ -39,11 +41,17 @@ class Rung(NamedTuple):
 
     weight: float  # factor on the obstacle weight
     slower: float  # factor on the duration
+    finer: float  # factor on the number of control points
     tether: float  # pull to the path: acceleration² that a deviation of 1 m is worth
+    from_rest: bool  # whether it only makes sense from a standing start
 
 
-LADDER = (Rung(1.0, 1.0, 0.0), Rung(4.0, 1.15, 0.0), Rung(8.0, 1.35, 50.0), Rung(16.0, 1.8, 400.0))
-_UNKNOWN_TETHER = 400.0  # of samples in unknown space, when that is not to be entered
+LADDER = (
+    Rung(1.0, 1.0, 1.0, 0.0, False),
+    Rung(2.0, 1.15, 1.5, 0.0, False),
+    Rung(4.0, 1.4, 1.5, 50.0, True),
+    Rung(8.0, 2.0, 2.0, 400.0, True),
+)
 
 
 class Settings(NamedTuple):
@@ -58,6 +66,7 @@ class Settings(NamedTuple):
     first_iterations: int
     final_iterations: int
     tolerance: float
+    z_band: float
     known_only: bool
     max_speed: float
     max_acceleration: float
@@ -106,6 +115,8 @@ def optimise(request: PlanRequest, path_m: Float, settings: Settings) -> Outcome
     problem = _prepare(request, path_m, settings)
     status, reason, iterations = PlanStatus.LIMITS, "no duration keeps the limits", 0
     for rung in LADDER:
+        if rung.from_rest and speed > _REST_MPS:
+            continue
         shaper = _Shaper(problem, settings, rung)
         curve = shaper.shape()
         iterations += shaper.iterations
@@ -114,7 +125,7 @@ def optimise(request: PlanRequest, path_m: Float, settings: Settings) -> Outcome
         if not np.isfinite(curve.control).all():
             status, reason = PlanStatus.SOLVER, "the solver returned NaN"
             continue
-        reason = _shortfall(problem, settings, curve)
+        reason = curve_shortfall(request, settings, curve)
         if not reason:
             return Outcome(PlanStatus.OK, "", curve, iterations)
         status = PlanStatus.NOT_CLEAR
@@ -127,7 +138,11 @@ def _prepare(request: PlanRequest, path_m: Float, settings: Settings) -> Problem
     start = np.stack([request.position_m, request.velocity_mps, request.acceleration_mps2])
     end = np.zeros((3, 3))
     end[0] = request.goal.position_m
-    problem = Problem(path, raw, start, end, request.field, request.flight_bounds_m)
+    bounds = request.flight_bounds_m.copy()  # and the search's height band
+    heights = (start[0, 2], end[0, 2])
+    bounds[0, 2] = max(bounds[0, 2], min(heights) - settings.z_band)
+    bounds[1, 2] = min(bounds[1, 2], max(heights) + settings.z_band)
+    problem = Problem(path, raw, start, end, request.field, bounds)
     if not request.goal.is_target:
         end[1] = _end_velocity(problem, settings)
     return problem
@@ -163,8 +178,9 @@ class _Shaper:
         self.problem, self.settings, self.rung = problem, settings, rung
         self.iterations = 0
         length = STEP_M * (len(problem.path) - 1)
-        count = round(length / settings.control_spacing) + 6
-        self.model: SplineModel = spline_model(min(max(count, _FEWEST), _MOST))
+        count = round(rung.finer * length / settings.control_spacing) + 6
+        count = min(max(count, CONTROL_POINTS.start), CONTROL_POINTS[-1])
+        self.model: SplineModel = spline_model(count + count % 2)
         hard = settings.min_clearance + _HARD_ABOVE_VOXELS * problem.field.voxel_size_m
         self.weights = np.array([settings.obstacle_weight * rung.weight, settings.safe_clearance, hard])
         self.limits = _QP_SHARE * np.array([settings.max_speed, settings.max_acceleration])
@@ -187,15 +203,17 @@ class _Shaper:
         placed = self._place(shape, times, 0.0)
         if abs(placed.h / curve.h - 1.0) > _RETIME:
             curve = placed
-        for _ in range(_STRETCHES):
+        worst = math.inf
+        while True:
             better, feasible = self._iterate(curve, settings.final_iterations)
             excess = self._excess(better)
             if feasible and excess <= 1.0:
                 return better
-            factor = max(_STRETCH, min(excess, 1.5))
-            curve = Curve(better.control, factor * better.h)
+            if excess > _STRETCH_GAIN * worst or not math.isfinite(excess):
+                return None
+            worst = excess
+            curve = Curve(better.control, max(_STRETCH, min(excess, 1.5)) * better.h)
             pin_ends(curve.control, curve.h, problem.start, problem.end)
-        return None
 
     def _place(self, points: Float, times: Float, late_s: float) -> Curve:
         """First guess along a timed polyline."""
@@ -268,37 +286,40 @@ def _start_on_path(problem: Problem, settings: Settings) -> tuple[float, float]:
     return max(along, 0.0), lost / settings.max_acceleration
 
 
-def _shortfall(problem: Problem, settings: Settings, curve: Curve) -> str:
-    """Say where the curve is not clear, checked every half voxel; empty when it is.
+def curve_shortfall(request: PlanRequest, settings: Settings, curve: Curve) -> str:
+    """Say where a curve is not clear, checked every half voxel; empty when it is."""
+    longest = float(np.linalg.norm(np.diff(curve.control, axis=0), axis=1).max())
+    per_segment = max(math.ceil(longest / (0.5 * request.field.voxel_size_m)), 1)
+    return shortfall(request, settings, sample_spline(curve.control, per_segment))
+
+
+def shortfall(request: PlanRequest, settings: Settings, points: Float) -> str:
+    """Say where a curve through these points (P, 3) from the request's start is not clear.
 
     A start below the hard limit may come no closer to the obstacle than its speed towards it
     makes unavoidable; once it has reached the limit it keeps it.
     """
-    field = problem.field
-    longest = float(np.linalg.norm(np.diff(curve.control, axis=0), axis=1).max())
-    per_segment = max(math.ceil(longest / (0.5 * field.voxel_size_m)), 1)
-    points = sample_spline(curve.control, per_segment)
-    clearance, known = field.distance_m(points), field.observed(points)
+    field, bounds = request.field, request.flight_bounds_m
+    clearance = field.distance_m(points)
     enough = clearance >= settings.min_clearance
-    escaped = int(np.argmax(enough)) if enough.any() else len(points)
-    if escaped > 0:
-        towards = max(-float(field.gradient(points[:1])[0] @ problem.start[1]), 0.0)
+    if not enough[0]:
+        escaped = int(np.argmax(enough)) if enough.any() else len(points)
+        towards = max(-float(field.gradient(points[:1])[0] @ request.velocity_mps), 0.0)
         stop_m = towards**2 / (2.0 * settings.max_acceleration)
         enough[:escaped] = clearance[:escaped] >= max(clearance[0] - stop_m - _START_SLACK_M, 0.0)
     if not enough.all():
         worst = int(np.argmin(np.where(enough, np.inf, clearance)))
         return f"clearance {clearance[worst]:.2f} m at {_text(points[worst])}"
-    slack = 1e-6 + np.maximum(
-        np.maximum(problem.bounds[0] - points[0], points[0] - problem.bounds[1]), 0.0
-    )  # a start outside may come back, not go further
-    outside = ((points < problem.bounds[0] - slack) | (points > problem.bounds[1] + slack)).any(axis=1)
+    # a start outside the bounds may come back, not go further
+    low, high = np.minimum(bounds[0], points[0]) - 1e-6, np.maximum(bounds[1], points[0]) + 1e-6
+    outside = ((points < low) | (points > high)).any(axis=1)
     if outside.any():
         return f"leaves the flight bounds at {_text(points[int(np.argmax(outside))])}"
     if settings.known_only:
-        hidden = ~known
-        hidden[: int(np.argmax(known))] = False  # a start in unknown space may leave it
-        if hidden.any():
-            return f"enters unknown space at {_text(points[int(np.argmax(hidden))])}"
+        known = field.observed(points)
+        known[: int(np.argmax(known))] = True  # a start in unknown space may leave it
+        if not known.all():
+            return f"enters unknown space at {_text(points[int(np.argmin(known))])}"
     return ""
 
 

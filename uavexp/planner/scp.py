@@ -19,8 +19,15 @@ from uavexp.types import Float, Float32
 HARD_WEIGHT = 10.0
 _NEAR_LIMIT = 0.6
 _NEAR_BOUND_M = 0.5
-_EXCESS_WEIGHT = 300.0  # of relative excess over a limit in the merit: an exact penalty
-_TURN = np.array([[1.0, 0.0], [0.85, 0.5267827], [0.85, -0.5267827]])  # cosine, sine of 0, ±32°
+_EXCESS_WEIGHT = 1000.0  # of relative excess over a limit in the merit: an exact penalty
+_HARD_STARTS = 4  # first accelerations, where a moving start leaves the least freedom
+# half spaces around a vector, in (along, level across, up from both): towards it and 24° from it,
+# then to the other sides as well
+_FAN = np.array(
+    [[1.0, 0.0, 0.0], [0.91, 0.4146083, 0.0], [0.91, -0.4146083, 0.0], [0.91, 0.0, 0.4146083]]
+    + [[0.91, 0.0, -0.4146083], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]
+    + [[-1.0, 0.0, 0.0]]
+)
 
 
 @nb.njit(cache=True, inline="always")
@@ -81,33 +88,45 @@ def _samples(control: Float, position: Float) -> Float:
 
 
 @nb.njit(cache=True)
+def _frame(vector: Float) -> Float:
+    """Unit vectors (3, 3) along a vector, level across it, and up from both.
+
+    The world's own axes when it is zero or within 6° of the vertical.
+    """
+    frame = np.zeros((3, 3))
+    norm = np.sqrt((vector * vector).sum())
+    flat = np.sqrt(vector[0] * vector[0] + vector[1] * vector[1])
+    if flat < 1e-6 or flat < 0.1 * norm:
+        for axis in range(3):
+            frame[axis, axis] = 1.0
+        return frame
+    for axis in range(3):
+        frame[0, axis] = vector[axis] / norm
+    frame[1, 0], frame[1, 1] = -vector[1] / flat, vector[0] / flat
+    frame[2, 0] = -frame[0, 2] * frame[1, 1]
+    frame[2, 1] = frame[0, 2] * frame[1, 0]
+    frame[2, 2] = flat / norm
+    return frame
+
+
+@nb.njit(cache=True)
 def _frames(control: Float) -> Float:
-    """Unit vectors (SAMPLES * M, 3, 3) along the curve, level across it, and up from both."""
+    """Frame (3, 3) of the direction of motion at each of the SAMPLES * M samples."""
     segments = control.shape[0] - 3
     chord = control[control.shape[0] - 1] - control[0]
-    frames = np.zeros((SAMPLES * segments, 3, 3))
+    frames = np.empty((SAMPLES * segments, 3, 3))
+    tangent = np.empty(3)
     for k in range(SAMPLES * segments):
         m = k // SAMPLES
         u = (k % SAMPLES + 0.5) / SAMPLES
-        t = np.empty(3)
         for axis in range(3):
             d0 = control[m + 1, axis] - control[m, axis]
             d1 = control[m + 2, axis] - control[m + 1, axis]
             d2 = control[m + 3, axis] - control[m + 2, axis]
-            t[axis] = 0.5 * (1 - u) * (1 - u) * d0 + (0.5 + u - u * u) * d1 + 0.5 * u * u * d2
-        if (t * t).sum() < 1e-8:
-            t[:] = chord
-        if t[0] * t[0] + t[1] * t[1] < 1e-2 * (t * t).sum() or (t * t).sum() < 1e-12:
-            for axis in range(3):  # steep or standing: the world's own axes
-                frames[k, axis, axis] = 1.0
-            continue
-        t /= np.sqrt((t * t).sum())
-        flat = np.sqrt(t[0] * t[0] + t[1] * t[1])
-        frames[k, 0] = t
-        frames[k, 1, 0], frames[k, 1, 1] = -t[1] / flat, t[0] / flat
-        frames[k, 2, 0] = -t[2] * frames[k, 1, 1]
-        frames[k, 2, 1] = t[2] * frames[k, 1, 0]
-        frames[k, 2, 2] = flat
+            tangent[axis] = 0.5 * (1 - u) * (1 - u) * d0 + (0.5 + u - u * u) * d1 + 0.5 * u * u * d2
+        if (tangent * tangent).sum() < 1e-8:
+            tangent[:] = chord
+        frames[k] = _frame(tangent)
     return frames
 
 
@@ -183,17 +202,17 @@ def quadratic_model(
 def limit_rows(control: Float, h: float, limits: Float, bounds: Float) -> tuple[Float, Float]:
     """Rows (R, 3n) and right sides (R,) of the QP: speed, acceleration and flight bounds.
 
-    Each norm limit is replaced by half spaces touching its ball: where the present vector
-    points, and for accelerations also at 32° to either side of it in plan. They hold the ball,
-    so a QP without solution means that the limits themselves cannot be kept; an acceleration
-    that turns by up to 48° exceeds its limit by 4 % at most. Only vectors beyond 0.6 of their limit
-    and control points within 0.5 m of a bound get rows.
+    Each norm limit is replaced by half spaces that touch its ball: where the present vector
+    points, and for accelerations also around that. They hold the ball, so a QP without
+    solution means that the limits themselves cannot be kept; an acceleration that turns by up
+    to 36° exceeds its limit by 2.3 % at most. Only vectors beyond 0.6 of their limit, the first
+    accelerations, and control points within 0.5 m of a bound get rows.
     """
     count = control.shape[0]
-    rows, sides = np.zeros((10 * count, 3 * (count - 6))), np.empty(10 * count)
+    rows, sides = np.zeros((20 * count, 3 * (count - 6))), np.empty(20 * count)
     size = 0
     stencil = np.array([[-1.0, 1.0, 0.0], [1.0, -2.0, 1.0]])
-    vector = np.empty(3)
+    vector, normal = np.empty(3), np.empty(3)
     for order in range(2):
         limit = limits[order] * h ** (1 + order)
         for i in range(2 - order, count - 3):
@@ -202,20 +221,23 @@ def limit_rows(control: Float, h: float, limits: Float, bounds: Float) -> tuple[
                 for j in range(2 + order):
                     vector[axis] += stencil[order, j] * control[i + j, axis]
             norm = np.sqrt((vector * vector).sum())
-            if norm < _NEAR_LIMIT * limit:
+            hard = order == 1 and i <= _HARD_STARTS
+            if not hard and norm < _NEAR_LIMIT * limit:
                 continue
-            for turn in range(1 + 2 * order):
-                x = (_TURN[turn, 0] * vector[0] - _TURN[turn, 1] * vector[1]) / norm
-                y = (_TURN[turn, 1] * vector[0] + _TURN[turn, 0] * vector[1]) / norm
-                z = vector[2] / norm
-                sides[size] = limit * np.sqrt(x * x + y * y + z * z)
-                sides[size] -= x * vector[0] + y * vector[1] + z * vector[2]
+            frame = _frame(vector)
+            for turn in range(10 if hard else 1 + 4 * order):
+                sides[size] = limit
+                for axis in range(3):
+                    normal[axis] = (
+                        _FAN[turn, 0] * frame[0, axis]
+                        + _FAN[turn, 1] * frame[1, axis]
+                        + _FAN[turn, 2] * frame[2, axis]
+                    )
+                    sides[size] -= normal[axis] * vector[axis]
                 for j in range(2 + order):
                     if 3 <= i + j < count - 3:
-                        at = 3 * (i + j - 3)
-                        rows[size, at] = stencil[order, j] * x
-                        rows[size, at + 1] = stencil[order, j] * y
-                        rows[size, at + 2] = stencil[order, j] * z
+                        for axis in range(3):
+                            rows[size, 3 * (i + j - 3) + axis] = stencil[order, j] * normal[axis]
                 size += 1
     for i in range(3, count - 3):
         for axis in range(3):

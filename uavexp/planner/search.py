@@ -35,6 +35,7 @@ _STEPS = np.array(
 )
 _LENGTHS = np.sqrt((_STEPS**2).sum(axis=1).astype(np.float64))
 
+_RESERVE_VOXELS = 0.25  # clearance of cells above the limit: for diagonal steps, and the curve's freedom
 _FOUND, _NO_PATH, _BUDGET = 0, 1, 2
 
 
@@ -352,11 +353,12 @@ class PathSearch:
 
     def _rule(self, start_clearance_m: float, voxel_m: float) -> Float:
         """Numbers the kernels read: min, safe, 1/(safe - min), weight, start's limit, its reach²."""
-        spread = self.safe_clearance_m - self.min_clearance_m
-        missing = max(self.min_clearance_m - start_clearance_m, 0.0)
+        least = self.min_clearance_m + _RESERVE_VOXELS * voxel_m
+        spread = self.safe_clearance_m - least
+        missing = max(least - start_clearance_m, 0.0)
         reach = (2.0 * missing / voxel_m + 3.0) ** 2 if missing > 0.0 else -1.0
         scale = 1.0 / spread if spread > 0.0 else 0.0
-        numbers = [self.min_clearance_m, self.safe_clearance_m, scale, self.clearance_weight]
+        numbers = [least, self.safe_clearance_m, scale, self.clearance_weight]
         return np.array([*numbers, start_clearance_m, reach])
 
     def _run(

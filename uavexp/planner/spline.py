@@ -31,6 +31,19 @@ class SplineModel:
 
 
 @cache
+def segment_model() -> ca.Function:
+    """CasADi function of one segment's control points (4,): its energy and its SAMPLES points."""
+    control, u = ca.SX.sym("c", 4), ca.SX.sym("u")
+    position = ca.dot(ca.vertcat(1, u, u**2, u**3), ca.DM(BASIS) @ control)
+    acceleration = ca.jacobian(ca.jacobian(position, u), u)
+    curve = ca.Function("curve", [control, u], [position, acceleration])
+    first, last = curve(control, 0)[1], curve(control, 1)[1]
+    energy = (first * first + first * last + last * last) / 3  # ∫ of a linear function squared
+    samples = [curve(control, (k + 0.5) / SAMPLES)[0] for k in range(SAMPLES)]
+    return ca.Function("segment", [control], [energy, ca.vertcat(*samples)])
+
+
+@cache
 def spline_model(control_points: int) -> SplineModel:
     """Write the minimum-acceleration problem of one axis in CasADi and take its matrices.
 
@@ -40,22 +53,16 @@ def spline_model(control_points: int) -> SplineModel:
         control_points: N >= 7.
     """
     control = ca.SX.sym("c", control_points)
-    u = ca.SX.sym("u")
-    powers = ca.vertcat(1, u, u**2, u**3)
-    basis = ca.DM(BASIS)
-    energy, samples = ca.SX(0), []
-    for m in range(control_points - 3):
-        r = ca.dot(powers, basis @ control[m : m + 4])
-        acceleration = ca.jacobian(ca.jacobian(r, u), u)
-        a, b = (ca.substitute(acceleration, u, ca.SX(end)) for end in (0, 1))
-        energy += (a * a + a * b + b * b) / 3  # ∫ of the square of a linear function
-        samples += [ca.substitute(r, u, ca.SX((k + 0.5) / SAMPLES)) for k in range(SAMPLES)]
-    hessian = ca.Function("hessian", [control], [ca.hessian(energy, control)[0]])(0)
-    position = ca.Function("position", [control], [ca.jacobian(ca.vertcat(*samples), control)])(0)
+    segment = segment_model()
+    parts = [segment(control[m : m + 4]) for m in range(control_points - 3)]
+    energy = sum((part[0] for part in parts), ca.SX(0))
+    samples = ca.vertcat(*[part[1] for part in parts])
+    hessian, position = ca.hessian(energy, control)[0], ca.jacobian(samples, control)
+    matrices = ca.Function("matrices", [], [hessian, position])()
     return SplineModel(
         control_points=control_points,
-        energy=np.ascontiguousarray(0.5 * hessian.full()),
-        position=np.ascontiguousarray(position.full()),
+        energy=np.ascontiguousarray(0.5 * matrices["o0"].full()),
+        position=np.ascontiguousarray(matrices["o1"].full()),
     )
 
 
@@ -154,4 +161,18 @@ def to_trajectory(control: Float, h: float, start_s: float, at_rest: bool) -> Tr
     coefficients = np.einsum("ij,mjk->mik", BASIS, windows) / h ** np.arange(4)[:, None]
     return Trajectory(
         breaks_s=start_s + h * np.arange(segments + 1), coefficients=coefficients, at_rest=at_rest
+    )
+
+
+def join(first: Trajectory, second: Trajectory) -> Trajectory:
+    """Fly one trajectory after the other; the second begins where and when the first ends."""
+    terms = max(first.coefficients.shape[1], second.coefficients.shape[1])
+    pieces = [
+        np.pad(part.coefficients, ((0, 0), (0, terms - part.coefficients.shape[1]), (0, 0)))
+        for part in (first, second)
+    ]
+    return Trajectory(
+        breaks_s=np.concatenate([first.breaks_s, second.breaks_s[1:]]),
+        coefficients=np.concatenate(pieces),
+        at_rest=second.at_rest,
     )

@@ -42,7 +42,7 @@ def _below(aspect: float) -> Page:
     plan = min(max(width * aspect, PLAN_HEIGHT_IN[0]), PLAN_HEIGHT_IN[1])
     tracking_y = BOTTOM_IN
     clearance_y = tracking_y + PANEL_IN + PANEL_GAP_IN
-    legend_y = clearance_y + PANEL_IN + 0.1
+    legend_y = clearance_y + PANEL_IN + 0.3
     plan_y = legend_y + LEGEND_IN + AXIS_LABEL_IN
     figure = Figure(figsize=(WIDTH_IN, plan_y + plan + HEADER_IN))
     bar_width = 1.7
@@ -70,7 +70,7 @@ def _beside(aspect: float) -> Page:
         plan=(LEFT_IN, BOTTOM_IN, plan_width, SIDE_PLAN_HEIGHT_IN),
         clearance=(x, clearance_y, width, panel),
         tracking=(x, BOTTOM_IN, width, panel),
-        speed_bar=(x + 0.05, clearance_y + panel + 0.55, 1.7, 0.1),
+        speed_bar=(x + 0.05, clearance_y + panel + 0.65, 1.7, 0.1),
         legend=(x - 0.1, top + 0.05),
         columns=2,
     )

@@ -7,7 +7,7 @@ import textwrap
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -100,7 +100,7 @@ def _draw_tracking(axes: Axes, log: TrialLog) -> None:
     error_m = np.linalg.norm(log.position_m - log.reference_position_m, axis=-1)
     axes.plot(log.time_s[::stride], error_m[::stride], color=style.BLUE, lw=1.1)
     size_pt = plan_view.marker_size_pt(log) - 1.5
-    top = {"transform": axes.get_xaxis_transform(), "clip_on": False, "zorder": 5}
+    top: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "clip_on": False, "zorder": 5}
     for replan in replanning.failed(log):
         axes.plot(replan.time_s, 1.0, **style.failed_marker(replan.cause, size_pt), **top)
     for replan in replanning.executed(log):
@@ -119,7 +119,9 @@ def _finish_panel(axes: Axes, log: TrialLog, *, legend: bool = True) -> None:
     if log.time_s.size < 2:
         axes.text(0.5, 0.5, "no flight", transform=axes.transAxes, ha="center", va="center", color="#606060")
     elif legend:
-        axes.legend(loc="upper right", ncols=3, handlelength=1.6, borderaxespad=0.1)
+        axes.legend(
+            loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, handlelength=1.6, borderaxespad=0.1
+        )
 
 
 def _draw_legend(sheet: page.Page, log: TrialLog) -> None:
@@ -156,7 +158,14 @@ def _event_handles(log: TrialLog) -> list[Line2D]:
         for cause, count in taken.items()
     ]
     if failed:
-        hollow = {"marker": "o", "ls": "", "mfc": "white", "mec": "#606060", "mew": 1.2, "ms": 6.5}
+        hollow: dict[str, Any] = {
+            "marker": "o",
+            "ls": "",
+            "mfc": "white",
+            "mec": "#606060",
+            "mew": 1.2,
+            "ms": 6.5,
+        }
         handles.append(Line2D([], [], label=f"hollow: no plan found ({failed})", **hollow))
     if log.contacts:
         label = f"contact ({len(log.contacts)})"

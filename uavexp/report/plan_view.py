@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap, ListedColormap, Normalize
+from matplotlib.ticker import MultipleLocator
 
 from uavexp.metrics import replanning
 from uavexp.report import section, style
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 BAND_M = 0.5  # the plan shows what stands within this of the flight height
 MARGIN_M = 3.0  # around everything flown
 LEAST_CELL_M, MOST_CELLS = 0.025, 2000  # of the section
-MOST_SEGMENTS = 3000  # of the flown path
+MOST_SEGMENTS = 1000  # of the flown path
 SPEED_COLOURS = LinearSegmentedColormap.from_list("speed", ["#8CC4EA", "#2F86C1", "#0A2F5C"])
 
 
@@ -45,7 +46,17 @@ def draw(axes: Axes, world: World, log: TrialLog, view: Float) -> Normalize:
     _draw_events(axes, log)
     _draw_task(axes, world)
     axes.set(xlim=view[:, 0], ylim=view[:, 1], aspect="equal", xlabel="x [m]", ylabel="y [m]")
+    tick_m = _tick_m(float(np.max(view[1] - view[0])))
+    axes.xaxis.set_major_locator(MultipleLocator(tick_m))
+    axes.yaxis.set_major_locator(MultipleLocator(tick_m))
     return scale
+
+
+def _tick_m(extent_m: float) -> float:
+    """The round distance that makes about ten ticks, the same along both axes."""
+    rough_m = max(extent_m, 0.1) / 10.0
+    power = 10.0 ** math.floor(math.log10(rough_m))
+    return next(step * power for step in (1.0, 2.0, 5.0, 10.0) if step * power >= 0.999 * rough_m)
 
 
 def _visited_m(world: World, log: TrialLog) -> Float:
@@ -101,12 +112,12 @@ def _draw_path(axes: Axes, log: TrialLog) -> Normalize:
     points = log.position_m.reshape(-1, 3)[::stride, :2]
     if points.shape[0] > 1:
         segments = list(np.stack([points[:-1], points[1:]], axis=1))
-        for width, values, zorder in ((3.4, None, 5.0), (2.0, speed_mps[::stride][:-1], 5.1)):
-            lines = LineCollection(
-                segments, linewidths=width, colors="white", cmap=SPEED_COLOURS, norm=scale, zorder=zorder
-            )
-            lines.set_array(values)
-            axes.add_collection(lines, autolim=False)
+        lines = LineCollection(
+            segments, linewidths=2.2, capstyle="round", cmap=SPEED_COLOURS, norm=scale, zorder=5.1
+        )
+        lines.set_array(speed_mps[::stride][:-1])
+        axes.plot(points[:, 0], points[:, 1], color="white", lw=3.8, zorder=5.0)
+        axes.add_collection(lines, autolim=False)
     return scale
 
 

@@ -39,7 +39,7 @@ CAUSE_MARKS = {
     "clock": Mark(PURPLE, "s"),
     "brake": Mark(BLACK, "v"),
 }
-OTHER_MARK = Mark(YELLOW, "P")
+OTHER_MARK = Mark("#606060", "P")
 
 
 def cause_mark(cause: str) -> Mark:

@@ -40,9 +40,7 @@ class Boxes:
         """Add a box of `size_m` around (x, y), its underside at `base_m`."""
         self.rows.append((x_m, y_m, base_m + 0.5 * size_m[2], *size_m, yaw_rad))
 
-    def place(
-        self, x_m: float, y_m: float, yaw_rad: float, parts: Sequence[Sequence[float]]
-    ) -> None:
+    def place(self, x_m: float, y_m: float, yaw_rad: float, parts: Sequence[Sequence[float]]) -> None:
         """Add a piece of furniture: parts (x, y, z, sx, sy, sz) about its own origin, z the underside."""
         c, s = math.cos(yaw_rad), math.sin(yaw_rad)
         for x, y, z, *size in parts:

@@ -79,7 +79,8 @@ class File:
             max_map_gib=self.max_map_gib,
         )
         require_non_negative(least_distance_m=self.least_distance_m)
-        require(math.isfinite(self.flight_height_m), f"flight_height_m must be finite, got {self.flight_height_m}")
+        height = self.flight_height_m
+        require(math.isfinite(height), f"flight_height_m must be finite, got {height}")
         require(self.up_axis in UP_AXES, f"up_axis must be one of {' '.join(UP_AXES)}, got {self.up_axis!r}")
         require(self.unknown in UNKNOWN, f"unknown must be wall or free, got {self.unknown!r}")
         require(
@@ -111,6 +112,8 @@ class File:
         else:
             start, target = self._drawn_ends(scene, flight_bounds, rng)
         path = task.shortest_path(scene, flight_bounds, start, target, self.clearance_m)
+        if path.shape[0] == 0:  # a door may fall between the nodes of the coarser lattice
+            path = task.shortest_path(scene, flight_bounds, start, target, self.clearance_m, task.FINE_CELL_M)
         if path.shape[0] == 0:
             widest = task.bottleneck_m(scene, flight_bounds, start, target, self.clearance_m)
             raise WorldError(
@@ -196,7 +199,7 @@ class File:
         return vertices, triangles
 
     def _checked_bounds(self, vertices: Float32) -> Float:
-        box = np.stack([vertices.min(axis=0), vertices.max(axis=0)]).astype(np.float64)
+        box = np.round(np.stack([vertices.min(axis=0), vertices.max(axis=0)]).astype(np.float64), 6)
         if self.flight_bounds_m is None:
             bounds = box + np.outer([1.0, -1.0], INSET_M)
             if not (bounds[0] < bounds[1]).all():

@@ -20,7 +20,7 @@ from uavexp.triangle_grid import TriangleGrid, ball_meets_mesh, box_meets_mesh
 from uavexp.types import Bool, Float, Int, UInt8
 
 SIGHT_STEP_M = 0.05  # between the points tested along a line of sight
-_UNTESTED, _PASSABLE, _BLOCKED = 0, 1, 2
+_UNTESTED, _BLOCKED, _PASSABLE, _PASSABLE_END = 0, 1, 2, 3
 
 
 def proof_radius_m(clearance_m: float, longest_edge_m: float) -> float:
@@ -30,7 +30,8 @@ def proof_radius_m(clearance_m: float, longest_edge_m: float) -> float:
 
 def shape_of(bounds_m: Float, cell_m: float) -> Int:
     """Number of nodes (3,) along each axis of the bounds (2, 3)."""
-    return np.maximum(1, np.floor((bounds_m[1] - bounds_m[0]) / cell_m + 1e-9).astype(np.int64))
+    count: Int = np.floor((bounds_m[1] - bounds_m[0]) / cell_m + 1e-9).astype(np.int64)
+    return np.maximum(1, count)
 
 
 @nb.njit(cache=True)
@@ -73,7 +74,7 @@ def in_sight(grid: TriangleGrid, a: Float, b: Float, clearance: float) -> bool:
     Never true wrongly; false at most by the proof radius, 0.7 mm at 0.45 m.
     """
     length = math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
-    count = max(1, int(math.ceil(length / SIGHT_STEP_M)))
+    count = max(1, math.ceil(length / SIGHT_STEP_M))
     radius = math.sqrt(clearance * clearance + 0.25 * (length / count) ** 2)
     stride = 1
     while stride < count:
@@ -91,7 +92,7 @@ def in_sight(grid: TriangleGrid, a: Float, b: Float, clearance: float) -> bool:
     return True
 
 
-@nb.njit(cache=True, inline="always")
+@nb.njit(cache=True)
 def _octile(dx: float, dy: float, dz: float) -> float:
     """Length of the shortest 26-connected path over (dx, dy, dz) in empty space."""
     a, b, c = abs(dx), abs(dy), abs(dz)
@@ -102,20 +103,24 @@ def _octile(dx: float, dy: float, dz: float) -> float:
 
 
 @nb.njit(cache=True)
-def _is_passable(
-    grid: TriangleGrid, tested: UInt8, flat: int, point: Float, radius: float
-) -> bool:
+def _is_passable(grid: TriangleGrid, tested: UInt8, flat: int, point: Float, radius: float) -> bool:
     if tested[flat] == _UNTESTED:
         tested[flat] = _BLOCKED if ball_meets_mesh(grid, point, radius) else _PASSABLE
-    return bool(tested[flat] == _PASSABLE)
+    return bool(tested[flat] >= _PASSABLE)
 
 
 @nb.njit(cache=True)
 def _entries(
-    grid: TriangleGrid, low: Float, cell: float, shape: Int, radius: float, clearance: float,
-    tested: UInt8, end: Float,
+    grid: TriangleGrid,
+    low: Float,
+    cell: float,
+    shape: Int,
+    radius: float,
+    clearance: float,
+    tested: UInt8,
+    end: Float,
 ) -> tuple[Int, Float]:
-    """Nodes around an end point that can be flown to straight, and how far each is.
+    """Nodes around an end point that can be flown to straight, ascending, and how far each is.
 
     The node at the point itself when there is one; else those within two cells.
     """
@@ -125,7 +130,7 @@ def _entries(
     point = np.empty(3)
     base = np.empty(3, dtype=np.int64)
     for axis in range(3):
-        base[axis] = int(math.floor((end[axis] - low[axis]) / cell))
+        base[axis] = math.floor((end[axis] - low[axis]) / cell)
     for i in range(base[0] - 2, base[0] + 3):
         for j in range(base[1] - 2, base[1] + 3):
             for k in range(base[2] - 2, base[2] + 3):
@@ -150,8 +155,15 @@ def _entries(
 
 @nb.njit(cache=True)
 def _column_is_passable(
-    grid: TriangleGrid, low: Float, cell: float, shape: Int, radius: float, tested: UInt8,
-    i: int, j: int, middle: int,
+    grid: TriangleGrid,
+    low: Float,
+    cell: float,
+    shape: Int,
+    radius: float,
+    tested: UInt8,
+    i: int,
+    j: int,
+    middle: int,
 ) -> bool:
     """Whether any node of a column is passable; those near the level `middle` are asked first."""
     point = np.empty(3)
@@ -168,8 +180,14 @@ def _column_is_passable(
 
 @nb.njit(cache=True)
 def _column_bound(
-    grid: TriangleGrid, low: Float, cell: float, shape: Int, radius: float, tested: UInt8,
-    starts: Int, ends: Int,
+    grid: TriangleGrid,
+    low: Float,
+    cell: float,
+    shape: Int,
+    radius: float,
+    tested: UInt8,
+    starts: Int,
+    ends: Int,
 ) -> Float:
     """Lower bound (X, Y) of the path length from each column to the nearest end node.
 
@@ -214,16 +232,19 @@ def _column_bound(
                     heapq.heappush(heap, (longer, near))
     if missing > 0:
         stopped = np.inf
-    for column in range(bound.shape[0]):
-        if not closed[column]:
-            bound[column] = stopped
-    return bound
+    return np.where(closed, bound, stopped)
 
 
 @nb.njit(cache=True)
 def shortest_path(
-    grid: TriangleGrid, low: Float, cell: float, shape: Int, radius: float, clearance: float,
-    start: Float, target: Float,
+    grid: TriangleGrid,
+    low: Float,
+    cell: float,
+    shape: Int,
+    radius: float,
+    clearance: float,
+    start: Float,
+    target: Float,
 ) -> Float:
     """Shortest path (P, 3) from start to target over passable nodes, 26-connected; A*.
 
@@ -254,12 +275,11 @@ def shortest_path(
     bound = _column_bound(grid, low, cell, shape, radius, tested, starts, ends)
     if bound[starts[0] // shape[2]] == np.inf:
         return np.empty((0, 3))
+    for flat in ends:
+        tested[flat] = _PASSABLE_END
     cost = np.full(size + 1, np.inf)  # node `size` is the target itself
-    parent = np.full(size + 1, -1, dtype=np.int64)
+    parent = np.full(size + 1, -1, dtype=np.int32)
     closed = np.zeros(size + 1, dtype=np.bool_)
-    is_end = np.full(size, np.inf, dtype=np.float32)
-    for n in range(ends.shape[0]):
-        is_end[ends[n]] = end_hops[n]
     slack = 0.14 * end_hops.max()  # octile is at most 1.14 times the straight distance
     heap = [(0.0, 0.0, np.int64(-1))]
     heap.pop()
@@ -276,10 +296,12 @@ def shortest_path(
         if flat == size:
             break
         i, j, k = flat // (shape[1] * shape[2]), flat // shape[2] % shape[1], flat % shape[2]
-        if is_end[flat] < np.inf and cost[flat] + is_end[flat] < cost[size]:
-            cost[size] = cost[flat] + is_end[flat]
-            parent[size] = flat
-            heapq.heappush(heap, (cost[size], 0.0, np.int64(size)))
+        if tested[flat] == _PASSABLE_END:
+            hop = end_hops[np.searchsorted(ends, flat)]
+            if cost[flat] + hop < cost[size]:
+                cost[size] = cost[flat] + hop
+                parent[size] = flat
+                heapq.heappush(heap, (cost[size], 0.0, np.int64(size)))
         for di in range(-1, 2):
             for dj in range(-1, 2):
                 for dk in range(-1, 2):
@@ -304,13 +326,12 @@ def shortest_path(
                     heapq.heappush(heap, (longer + ahead, ahead, np.int64(near)))
     if not closed[size]:
         return np.empty((0, 3))
-    return _trace(parent, size, low, cell, shape, start, target)
+    path: Float = _trace(parent, size, low, cell, shape, start, target)
+    return path
 
 
 @nb.njit(cache=True)
-def _trace(
-    parent: Int, size: int, low: Float, cell: float, shape: Int, start: Float, target: Float
-) -> Float:
+def _trace(parent: Int, size: int, low: Float, cell: float, shape: Int, start: Float, target: Float) -> Float:
     count = 0
     flat = parent[size]
     while flat >= 0:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uavexp.errors import require, require_non_negative, require_positive
+from uavexp.errors import require, require_non_negative
 from uavexp.types import World
 from uavexp.world import indoor
 from uavexp.world.boxes import Boxes
@@ -40,7 +40,7 @@ class RandomColumns:
     def __post_init__(self) -> None:
         self.size_m = indoor.checked_size(self.size_m, self.flight_height_m, self.clearance_m)
         require_non_negative(density_per_m2=self.density_per_m2, gap_m=self.gap_m)
-        require(self.density_per_m2 <= 10.0, f"density_per_m2 must be <= 10, got {self.density_per_m2}")
+        require(self.density_per_m2 <= 5.0, f"density_per_m2 must be <= 5, got {self.density_per_m2}")
         self.width_m = indoor.checked_range("width_m", self.width_m)
         require(1 <= self.row <= 50, f"row must be 1 to 50 columns, got {self.row}")
         require(0.0 <= self.partial_share <= 1.0, f"partial_share must be 0 to 1, got {self.partial_share}")
@@ -65,7 +65,10 @@ class RandomColumns:
             x, y, turn = rng.uniform(0.0, (length, width, np.pi))
             members: list[tuple[float, float, float]] = []
             for _ in range(int(rng.integers(1, self.row + 1))):
-                across = rng.uniform(*self.width_m)
+                across = rng.uniform(self.width_m[0], self.width_m[1])
+                reach = 0.5 * np.sqrt(2.0) * across  # of a square column's corner
+                x = float(np.clip(x, reach, length - reach))
+                y = float(np.clip(y, reach, width - reach))
                 if indoor.apart(x, y, taken, 0.5 * across + self.gap_m):
                     members.append((x, y, 0.5 * across))
                     self._column(boxes, rng, x, y, across)

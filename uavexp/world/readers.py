@@ -167,10 +167,7 @@ def _obj_faces(path: Path) -> int:
 
 def read_cloud(path: Path) -> Float:
     """Return the points (N, 3) of a pcd or ply file, in the file's unit; invalid (NaN) ones dropped."""
-    if path.suffix.lower() == ".pcd":
-        promised = _pcd_points(path)
-    else:
-        promised = ply_counts(path)[0]
+    promised = _pcd_points(path) if path.suffix.lower() == ".pcd" else ply_counts(path)[0]
     with _silence():
         cloud = open3d.io.read_point_cloud(str(path), remove_nan_points=False, remove_infinite_points=False)
     points = np.asarray(cloud.points, dtype=np.float64)
@@ -195,9 +192,7 @@ def _pcd_points(path: Path) -> int:
     if begin[1] == b"ascii":
         rows = sum(1 for line in data[begin.end() :].split(b"\n") if line.strip())
         if rows < promised:
-            raise WorldError(
-                f"world file {path} is truncated: {promised} points promised, {rows} rows found"
-            )
+            raise WorldError(f"world file {path} is truncated: {promised} points promised, {rows} rows found")
     return promised
 
 
@@ -222,7 +217,7 @@ def read_voxels(path: Path) -> Voxels:
         occupied = origin + (arrays["occupied_index"] + 0.5) * size
         free = origin + (arrays["free_index"] + 0.5) * size if "free_index" in arrays else None
     elif "occupied" in arrays or "centres" in arrays:
-        occupied, free = arrays.get("occupied", arrays.get("centres")), arrays.get("free")
+        occupied, free = arrays["occupied" if "occupied" in arrays else "centres"], arrays.get("free")
     else:
         raise WorldError(
             f"world file {path} needs 'centres', 'occupied' or 'occupied_index' with 'origin'; "
@@ -233,7 +228,7 @@ def read_voxels(path: Path) -> Voxels:
             raise WorldError(f"world file {path}: {name} voxels must be (N, 3), got {centres.shape}")
         if centres is not None and not np.isfinite(centres).all():
             raise WorldError(f"world file {path} has {name} voxels that are NaN or infinite")
-    if occupied is None or occupied.shape[0] == 0:
+    if occupied.shape[0] == 0:
         raise WorldError(f"world file {path} holds no occupied voxels")
     return Voxels(occupied=occupied, free=free, resolution=size)
 

@@ -17,8 +17,9 @@ DOOR_CORNER_M = 0.35  # least distance of a door from the end of its wall
 DOOR_KEEP_M = 0.9  # no furniture nearer to a door's middle
 
 # parts are (x, y, underside, length, width, height) about the piece's middle, m
-TABLE = ((0.0, 0.0, 0.71, 1.5, 0.8, 0.04),) + tuple(
-    (x, y, 0.0, 0.06, 0.06, 0.71) for x in (-0.69, 0.69) for y in (-0.34, 0.34)
+TABLE = (
+    (0.0, 0.0, 0.71, 1.5, 0.8, 0.04),
+    *((x, y, 0.0, 0.06, 0.06, 0.71) for x in (-0.69, 0.69) for y in (-0.34, 0.34)),
 )
 CHAIR = (
     (0.0, 0.0, 0.42, 0.44, 0.44, 0.05),
@@ -28,7 +29,8 @@ CHAIR = (
 SOFA = ((0.0, 0.0, 0.0, 0.85, 1.8, 0.42), (-0.33, 0.0, 0.42, 0.2, 1.8, 0.4))
 CUPBOARD = ((0.0, 0.0, 0.0, 0.45, 1.0, 2.0),)
 SIDEBOARD = ((0.0, 0.0, 0.0, 0.45, 1.4, 0.85),)
-BOOKCASE = tuple((0.0, 0.0, z, 0.3, 0.9, 0.03) for z in (0.0, 0.45, 0.9, 1.35, 1.8)) + (
+BOOKCASE = (
+    *((0.0, 0.0, z, 0.3, 0.9, 0.03) for z in (0.0, 0.45, 0.9, 1.35, 1.8)),
     (0.0, -0.435, 0.0, 0.3, 0.03, 1.83),
     (0.0, 0.435, 0.0, 0.3, 0.03, 1.83),
     (-0.14, 0.0, 0.0, 0.02, 0.9, 1.83),
@@ -77,16 +79,16 @@ class Rooms:
 
     def __post_init__(self) -> None:
         self.size_m = indoor.checked_size(self.size_m, self.flight_height_m, self.clearance_m)
-        require_positive(
-            room_m=self.room_m, door_width_m=self.door_width_m, door_height_m=self.door_height_m
-        )
+        require_positive(room_m=self.room_m, door_width_m=self.door_width_m, door_height_m=self.door_height_m)
         require(
             self.door_width_m >= 2.0 * self.clearance_m,
             f"door_width_m must be at least twice clearance_m, {2.0 * self.clearance_m:g} m, "
             f"got {self.door_width_m}",
         )
         least = self.door_width_m + 2.0 * DOOR_CORNER_M
-        require(self.room_m >= least, f"room_m must be at least {least:g} m to hold a door, got {self.room_m}")
+        require(
+            self.room_m >= least, f"room_m must be at least {least:g} m to hold a door, got {self.room_m}"
+        )
         require(
             0.0 <= self.second_door_share <= 1.0,
             f"second_door_share must be 0 to 1, got {self.second_door_share}",

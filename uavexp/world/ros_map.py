@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
+import yaml  # type: ignore[import-untyped]  # with omegaconf
 
 from uavexp.errors import WorldError
 from uavexp.types import Bool, Float

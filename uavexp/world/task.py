@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+from itertools import pairwise
 
 import numpy as np
 from scipy import ndimage
@@ -18,6 +19,7 @@ from uavexp.types import Difficulty, Float, Float32, Int32, World
 from uavexp.world import lattice
 
 CELL_M = 0.1  # spacing of the lattice on which the shortest path is exact
+FINE_CELL_M = 0.05  # tried where that one is too coarse for a building's passages
 LAYER_CELL_M = 0.2  # spacing of the layer from which start and target are drawn
 MAX_KNOTS = 120  # points of a path that is being tightened
 MIN_KNOT_STEP_M = 0.2
@@ -29,20 +31,26 @@ BOTTLENECK_STEP_M = 0.01
 
 
 def shortest_path(
-    scene: Scene, flight_bounds_m: Float, start_m: Float, target_m: Float, clearance_m: float
+    scene: Scene,
+    flight_bounds_m: Float,
+    start_m: Float,
+    target_m: Float,
+    clearance_m: float,
+    cell_m: float = CELL_M,
 ) -> Float:
     """Shortest known path (P, 3) that keeps `clearance_m` from every surface.
 
-    The exact shortest 26-connected path on a 0.1 m lattice, pulled tight by lines of sight:
-    an upper bound of the true shortest length, in practice within about 1 % of it.
+    The exact shortest 26-connected path on a lattice, pulled tight by lines of sight: an
+    upper bound of the true shortest length, in practice within about 1 % of it. A lattice
+    misses passages that are wider than twice the clearance by less than about its spacing.
 
     Returns:
         The path, ends included; (0, 3) when the two are not joined.
     """
-    shape = lattice.shape_of(flight_bounds_m, CELL_M)
-    radius = lattice.proof_radius_m(clearance_m, math.sqrt(3.0) * CELL_M)
-    path = lattice.shortest_path(
-        scene.grid, flight_bounds_m[0], CELL_M, shape, radius, clearance_m, start_m, target_m
+    shape = lattice.shape_of(flight_bounds_m, cell_m)
+    radius = lattice.proof_radius_m(clearance_m, math.sqrt(3.0) * cell_m)
+    path: Float = lattice.shortest_path(
+        scene.grid, flight_bounds_m[0], cell_m, shape, radius, clearance_m, start_m, target_m
     )
     if path.shape[0] == 0:
         return path
@@ -56,20 +64,25 @@ def _knots(path_m: Float) -> Float:
     """The path's own points and more between them, so that tightening can move its corners."""
     step = max(MIN_KNOT_STEP_M, polyline_length_m(path_m) / MAX_KNOTS)
     pieces = [path_m[:1]]
-    for a, b in zip(path_m[:-1], path_m[1:], strict=True):
+    for a, b in pairwise(path_m):
         count = max(1, math.ceil(float(np.linalg.norm(b - a)) / step))
         pieces.append(a + (b - a) * (np.arange(1, count + 1) / count)[:, None])
     return np.concatenate(pieces)
 
 
-def bottleneck_m(scene: Scene, flight_bounds_m: Float, start_m: Float, target_m: Float, below_m: float) -> float:
-    """Largest clearance, to 1 cm and under `below_m`, at which start and target are joined; 0 if none."""
+def bottleneck_m(
+    scene: Scene, flight_bounds_m: Float, start_m: Float, target_m: Float, below_m: float
+) -> float:
+    """Largest clearance at which start and target are joined on the fine lattice.
+
+    Returns:
+        A multiple of 1 cm under `below_m`; 0 when they are not joined at all.
+    """
     low, high = 0, math.ceil(below_m / BOTTLENECK_STEP_M)
     while high - low > 1:
         middle = (low + high) // 2
-        joined = shortest_path(
-            scene, flight_bounds_m, start_m, target_m, middle * BOTTLENECK_STEP_M
-        ).shape[0]
+        clearance = middle * BOTTLENECK_STEP_M
+        joined = shortest_path(scene, flight_bounds_m, start_m, target_m, clearance, FINE_CELL_M).shape[0]
         low, high = (middle, high) if joined else (low, middle)
     return low * BOTTLENECK_STEP_M
 

@@ -22,7 +22,7 @@ def exposed_faces(occupied: Bool, origin_m: Float, voxel_m: Float) -> tuple[Floa
     quads = _rectangles(np.ascontiguousarray(np.pad(occupied, 1)))
     vertices = origin_m + (quads.reshape(-1, 3) - 1.0) * voxel_m
     first = 4 * np.arange(quads.shape[0])[:, None]
-    triangles = np.concatenate([first + [0, 1, 2], first + [0, 2, 3]], axis=1).reshape(-1, 3)
+    triangles = (first + np.array([0, 1, 2, 0, 2, 3])).reshape(-1, 3)
     return vertices.astype(np.float32), triangles.astype(np.int32)
 
 

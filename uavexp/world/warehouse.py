@@ -20,6 +20,7 @@ SHELF_PITCH_M = 0.6  # between shelves: carton shelving; one sees through a bay,
 HEADROOM_M = 0.45  # between the top of the posts and the ceiling
 PALLET_M = (1.2, 0.8, 0.144)  # EUR pallet
 PILLAR_PITCH_M = 6.5
+LITTER_TO_WALL_M = 0.75  # of an item's middle: half a pallet's diagonal
 CLUTTER_GAP_M = 0.2  # least distance between two clutter items
 
 
@@ -60,7 +61,8 @@ class Warehouse:
         )
         require_non_negative(cross_aisles=self.cross_aisles, ducts=self.ducts)
         require(0.0 <= self.load_share <= 1.0, f"load_share must be 0 to 1, got {self.load_share}")
-        require(0.0 <= self.clutter_per_m2 <= 5.0, f"clutter_per_m2 must be 0 to 5, got {self.clutter_per_m2}")
+        clutter = self.clutter_per_m2
+        require(0.0 <= clutter <= 5.0, f"clutter_per_m2 must be 0 to 5, got {clutter}")
 
     def generate(self, rng: np.random.Generator) -> World:
         """Return the world; raise `WorldError` when no drawing joins start and target."""
@@ -118,7 +120,14 @@ class Warehouse:
                 self._load(boxes, rng, posts[bay] + POST_M, posts[bay + 1], front, z, room)
 
     def _load(
-        self, boxes: Boxes, rng: np.random.Generator, begin: float, end: float, front: float, z: float, room: float
+        self,
+        boxes: Boxes,
+        rng: np.random.Generator,
+        begin: float,
+        end: float,
+        front: float,
+        z: float,
+        room: float,
     ) -> None:
         """Goods in one bay of one shelf: up to three places, each filled with `load_share`."""
         place = (end - begin) / 3.0
@@ -146,6 +155,8 @@ class Warehouse:
             x, y, kind, turn, a, b, c = rng.uniform(0.0, (length, width, 1.0, 1.0, 1.0, 1.0, 1.0))
             yaw = 0.5 * np.pi * round(turn * 3.0) + 0.25 * (turn - 0.5)
             long, deep = PALLET_M[0] * (0.5 + 0.5 * a), PALLET_M[1] * (0.5 + 0.5 * b)
+            x = float(np.clip(x, LITTER_TO_WALL_M, length - LITTER_TO_WALL_M))
+            y = float(np.clip(y, LITTER_TO_WALL_M, width - LITTER_TO_WALL_M))
             if not indoor.apart(x, y, taken, 0.5 * np.hypot(long, deep) + CLUTTER_GAP_M):
                 continue
             taken.append((x, y, 0.5 * float(np.hypot(long, deep))))

@@ -1,0 +1,133 @@
+"""Imports point one way (DESIGN.md): read from the source, nothing is imported."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from uavexp.build import GROUPS
+from uavexp.paths import PACKAGE
+
+# a module may import modules of lower layers; within a layer, freely where it says so
+LAYERS = (
+    {"errors"},
+    {"types", "kernel_cache", "__init__"},
+    {"seeding", "geometry", "o3d", "triangle_grid", "scene", "paths"},
+    {"roles", "metrics"},
+    {"recorder", "pilot", "trial", "parameters", "trust", "records", "logs", "table"},
+    {"sweep", "report"},
+    {"build"},
+    {"cli", "__main__"},
+)
+FREE_WITHIN = {"cli", "metrics", "report", "sweep"}
+HYDRA = ("hydra", "omegaconf")
+
+
+def modules() -> list[Path]:
+    return sorted(PACKAGE.rglob("*.py"))
+
+
+def name_of(file: Path) -> str:
+    parts = file.relative_to(PACKAGE.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" and len(parts) > 2 else parts)
+
+
+def imports(file: Path) -> Iterator[tuple[str, bool]]:
+    """Imported module names, and whether only for type checking."""
+    tree = ast.parse(file.read_text(encoding="utf-8"))
+    typing_only = {
+        id(inner)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
+        for inner in ast.walk(node)
+    }
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from ((alias.name, id(node) in typing_only) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{file}: relative import"
+            yield str(node.module), id(node) in typing_only
+            for alias in node.names:
+                if (PACKAGE.parent / str(node.module).replace(".", "/") / f"{alias.name}.py").is_file():
+                    yield f"{node.module}.{alias.name}", id(node) in typing_only
+
+
+def part_of(module: str) -> str:
+    words = module.split(".")
+    part = words[1] if len(words) > 1 else "__init__"
+    return "roles" if part in GROUPS else part
+
+
+def layer_of(module: str) -> int:
+    found = [index for index, layer in enumerate(LAYERS) if part_of(module) in layer]
+    assert found, f"{module} has no layer: add it to LAYERS"
+    return found[0]
+
+
+@pytest.mark.parametrize("file", modules(), ids=name_of)
+def test_a_module_imports_only_what_lies_below(file: Path) -> None:
+    here = name_of(file)
+    if part_of(here) == "__init__":
+        return  # its one import of `fly` happens when it is called
+    for module, typing_only in imports(file):
+        if module.split(".")[0] != "uavexp" or typing_only or module == "uavexp":
+            continue
+        above = layer_of(module) > layer_of(here)
+        assert not above, f"{here} imports {module}, which lies above it"
+
+
+@pytest.mark.parametrize("file", modules(), ids=name_of)
+def test_a_role_imports_another_role_through_its_base_or_pure_modules(file: Path) -> None:
+    here = name_of(file).split(".")
+    if here[1] not in GROUPS:
+        return
+    options = {
+        f"uavexp.{group}.{item.stem}"
+        for group in GROUPS
+        for item in (PACKAGE.parent / "conf" / group).glob("*.yaml")
+    }
+    for module, _ in imports(file):
+        foreign = (
+            module.startswith("uavexp.")
+            and module.split(".")[1] in GROUPS
+            and module.split(".")[1] != here[1]
+        )
+        assert not (foreign and module in options), f"{'.'.join(here)} imports the option {module}"
+
+
+@pytest.mark.parametrize("file", modules(), ids=name_of)
+def test_hydra_stays_on_the_command_line(file: Path) -> None:
+    users = [module for module, _ in imports(file) if module.split(".")[0] in HYDRA]
+    assert not users or part_of(name_of(file)) in ("cli", "build", "__main__"), f"{file} imports {users}"
+
+
+@pytest.mark.parametrize("file", modules(), ids=name_of)
+def test_open3d_comes_through_its_loader(file: Path) -> None:
+    users = [module for module, _ in imports(file) if module.split(".")[0] == "open3d"]
+    assert not users or file.name == "o3d.py"
+
+
+def test_there_is_no_cycle() -> None:
+    graph = {
+        name_of(file): {
+            module
+            for module, typing_only in imports(file)
+            if module.startswith("uavexp.") and not typing_only
+        }
+        for file in modules()
+        if name_of(file) != "uavexp.__init__"
+    }
+
+    def visit(module: str, path: tuple[str, ...]) -> None:
+        assert module not in path, " -> ".join([*path, module])
+        if module not in done:
+            for inner in sorted(graph.get(module, ())):
+                visit(inner, (*path, module))
+            done.add(module)
+
+    done: set[str] = set()
+    for module in sorted(graph):
+        visit(module, ())

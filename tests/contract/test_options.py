@@ -1,0 +1,176 @@
+"""One word everywhere: group = package = protocol = folder of yaml; option = module = yaml.
+
+Options are found by glob: a new planner is one .py and one .yaml, and no edit here.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import inspect
+import re
+from pathlib import Path
+
+import pytest
+import yaml
+
+from uavexp.build import (
+    GROUPS,
+    TARGET,
+    TOP_LEVEL,
+    build_component,
+    component_class,
+    protocol_members,
+    protocol_of,
+)
+from uavexp.cli.composition import Composer
+from uavexp.cli.options import PRESET_GROUP, read_option
+from uavexp.cli.overrides import Setting, parse_settings
+from uavexp.parameters import MISSING, check_value, parameter_types, plain, required_parameters
+from uavexp.paths import PACKAGE, conf_folder
+from uavexp.trial import Parts
+
+CONF = conf_folder()
+OPTIONS = sorted((file.parent.name, file.stem) for group in GROUPS for file in (CONF / group).glob("*.yaml"))
+PRESETS = sorted(file.stem for file in (CONF / PRESET_GROUP).glob("*.yaml"))
+COMPOSER = Composer()
+
+
+def load(group: str, option: str) -> dict[str, object]:
+    return dict(yaml.safe_load((CONF / group / f"{option}.yaml").read_text()))
+
+
+def values(tree: dict[str, object]) -> dict[str, object]:
+    return {key: value for key, value in tree.items() if key != TARGET}
+
+
+def test_every_group_is_a_folder_a_package_and_a_role_of_a_trial() -> None:
+    folders = {item.name for item in CONF.iterdir() if item.is_dir()}
+    assert folders == {*GROUPS, PRESET_GROUP}
+    assert all((PACKAGE / group / "base.py").is_file() for group in GROUPS)
+    assert [item.name for item in dataclasses.fields(Parts)] == [*GROUPS, *TOP_LEVEL]
+
+
+def test_every_group_has_an_option_and_a_default_that_exists() -> None:
+    tree = COMPOSER.compose([])
+    for group in GROUPS:
+        assert (group, tree["hydra"]["runtime"]["choices"][group]) in OPTIONS
+
+
+def test_the_defaults_of_no_group_are_those_of_a_trial() -> None:
+    config = yaml.safe_load((CONF / "config.yaml").read_text())
+    defaults = {item.name: item.default for item in dataclasses.fields(Parts) if item.name in TOP_LEVEL}
+    assert {key: config[key] for key in TOP_LEVEL} == defaults
+
+
+@pytest.mark.parametrize("group", GROUPS)
+def test_a_base_module_defines_one_protocol_with_members(group: str) -> None:
+    assert protocol_of(group).__module__ == f"uavexp.{group}.base"
+    assert protocol_members(group)
+
+
+@pytest.mark.parametrize(("group", "option"), OPTIONS)
+def test_an_option_is_a_class_in_the_module_of_its_name(group: str, option: str) -> None:
+    target = str(load(group, option)[TARGET])
+    cls = component_class(group, target)
+    assert target == f"uavexp.{group}.{option}.{cls.__name__}"
+    assert cls.__module__ == f"uavexp.{group}.{option}"
+
+
+@pytest.mark.parametrize(("group", "option"), OPTIONS)
+def test_yaml_and_class_have_the_same_parameters_and_defaults(group: str, option: str) -> None:
+    tree = load(group, option)
+    cls = component_class(group, str(tree[TARGET]))
+    annotations = parameter_types(cls)
+    assert list(values(tree)) == list(annotations), "same names in the same order"
+    for name, value in values(tree).items():
+        if value == MISSING:
+            assert name in required_parameters(cls)
+            continue
+        default = inspect.signature(cls).parameters[name].default
+        if default is not inspect.Parameter.empty:  # a field with a default factory shows a marker
+            shown = repr(default) != "<factory>"
+            converted = plain(check_value(name, value, annotations[name]))
+            assert not shown or converted == plain(default), f"{name}: yaml {value!r}, class {default!r}"
+
+
+@pytest.mark.parametrize(("group", "option"), OPTIONS)
+def test_every_parameter_has_a_comment(group: str, option: str) -> None:
+    bare = [item.name for item in read_option(CONF / group / f"{option}.yaml").parameters if not item.comment]
+    assert not bare
+
+
+@pytest.mark.parametrize(("group", "option"), OPTIONS)
+def test_every_dimensional_parameter_states_its_unit(group: str, option: str) -> None:
+    suffixes = {"_m": "m", "_s": "s", "_mps": "m/s", "_mps2": "m/s²", "_hz": "Hz", "_deg": "deg", "_px": "px"}
+    for item in read_option(CONF / group / f"{option}.yaml").parameters:
+        for suffix, unit in suffixes.items():
+            if item.name.endswith(suffix):
+                stated = unit in re.split(r"[\s,;:()]+", item.comment.replace("m/s^2", "m/s²"))
+                assert stated, f"{item.name}: no {unit} in {item.comment!r}"
+
+
+@pytest.mark.parametrize(("group", "option"), OPTIONS)
+def test_every_option_composes_and_builds(group: str, option: str, tmp_path: Path) -> None:
+    settings = [Setting(key=group, values=(option,))]
+    tree = load(group, option)
+    for name in (name for name, value in values(tree).items() if value == MISSING):
+        file = tmp_path / "any.ply"
+        file.touch()
+        settings.append(Setting(key=f"{group}.{name}", values=(str(file),)))
+    cell = COMPOSER.cell(settings)
+    assert cell.options[group] == option
+    component = build_component(group, cell.config[group])
+    for name in parameter_types(type(component)):
+        assert hasattr(component, name)
+
+
+@pytest.mark.parametrize(("group", "option"), OPTIONS)
+def test_an_option_speaks_its_protocol(group: str, option: str) -> None:
+    protocol = protocol_of(group)
+    cls = component_class(group, str(load(group, option)[TARGET]))
+    for name, member in vars(protocol).items():
+        if name.startswith("_") or not inspect.isfunction(member):
+            continue
+        wanted = list(inspect.signature(member).parameters)
+        have = list(inspect.signature(getattr(cls, name)).parameters)
+        assert have == wanted, f"{cls.__name__}.{name}{have}, the protocol has {wanted}"
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_a_preset_only_overrides(preset: str) -> None:
+    text = (CONF / PRESET_GROUP / f"{preset}.yaml").read_text()
+    assert text.startswith("# @package _global_\n")
+    tree = yaml.safe_load(text)
+    groups = [key.removeprefix("override /") for item in tree.pop("defaults") for key in item]
+    assert set(groups) <= set(GROUPS)
+    assert all(set(values(part)) == set(part) for part in tree.values()), "a preset names no class"
+    cell = COMPOSER.cell(parse_settings([f"{PRESET_GROUP}={preset}"]))
+    assert cell.strategy == preset
+
+
+def test_presets_differ_in_the_trigger_only() -> None:
+    cells = [COMPOSER.cell(parse_settings([f"{PRESET_GROUP}={preset}"])) for preset in PRESETS]
+    shared = [{key: value for key, value in cell.config.items() if key != "trigger"} for cell in cells]
+    assert all(part == shared[0] for part in shared)
+    assert len({repr(cell.config["trigger"]) for cell in cells}) == len(cells)
+
+
+def test_every_module_with_a_component_has_its_yaml() -> None:
+    for group in GROUPS:
+        members = protocol_members(group)
+        for file in sorted((PACKAGE / group).glob("*.py")):
+            if file.stem in ("__init__", "base") or (group, file.stem) in OPTIONS:
+                continue
+            module = importlib.import_module(f"uavexp.{group}.{file.stem}")
+            components = [
+                item.__name__
+                for item in vars(module).values()
+                if inspect.isclass(item)
+                and item.__module__ == module.__name__
+                and not inspect.isabstract(item)
+                and all(hasattr(item, name) for name in members)
+            ]
+            assert not components, (
+                f"{file.name} defines {components} but conf/{group}/{file.stem}.yaml is missing"
+            )
