@@ -36,8 +36,8 @@ $(STAMP): requirements.lock
 ifneq ($(UV),)
 	@$(BIN)/python -c '$(SUPPORTED)' >/dev/null 2>&1 || \
 	    $(UV) venv --quiet --clear --python "$(or $(PYTHON),>=3.11$(comma)<3.14)" $(VENV)
-	@$(UV) pip install --quiet --python $(BIN)/python --require-hashes -r requirements.lock
-	@$(UV) pip install --quiet --python $(BIN)/python --no-deps --no-build-isolation -e .
+	@$(call twice,$(UV) pip install --quiet --python $(BIN)/python --require-hashes -r requirements.lock)
+	@$(call twice,$(UV) pip install --quiet --python $(BIN)/python --no-deps --no-build-isolation -e .)
 else
 	@test -n "$(PYTHON)" || { echo "uavexp needs Python 3.11, 3.12 or 3.13; none of these runs: $(PYTHONS)" >&2; exit 1; }
 	@$(BIN)/python -c '$(SUPPORTED); import pip' >/dev/null 2>&1 || $(PYTHON) -m venv --clear $(VENV) || \
@@ -59,3 +59,5 @@ clean:
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 comma := ,
+# uv 0.13 was seen to crash while exiting, once in a hundred runs; its steps may be repeated safely
+twice = $(1) || $(1)

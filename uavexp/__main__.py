@@ -55,17 +55,21 @@ def _run(arguments: argparse.Namespace) -> int:
         sys.stdout.write(help_text(folder, group))
         return 0
 
+    if arguments.info:
+        from uavexp.cli.show import info_text
+
+        sys.stdout.write(info_text(folder))
+        return 0
+
     from uavexp.cli.composition import Composer
     from uavexp.cli.overrides import parse_settings
 
     composer = Composer(user_folder=folder)
     command = composer.command(parse_settings(arguments.overrides))
-    if arguments.cfg or arguments.info:
-        from uavexp.cli.show import config_text, info_text
+    if arguments.cfg:
+        from uavexp.cli.show import config_text
 
-        sys.stdout.write(
-            info_text(folder) if arguments.info else config_text(composer, command, arguments.cfg)
-        )
+        sys.stdout.write(config_text(composer, command, arguments.cfg))
         return 0
 
     from uavexp.cli.run import execute

@@ -43,7 +43,7 @@ def arrays_digest(arrays: Mapping[str, npt.NDArray[Any]]) -> str:
     """sha256 over names, types, shapes and values; independent of how a zip packs them."""
     total = hashlib.sha256()
     for name in sorted(arrays):
-        array = np.ascontiguousarray(arrays[name])
+        array = np.asarray(arrays[name], order="C")
         total.update(f"{name}\0{array.dtype.str}\0{array.shape}\0".encode())
         total.update(array.tobytes())
     return total.hexdigest()
@@ -58,7 +58,7 @@ def write_log(path: Path, arrays: Mapping[str, npt.NDArray[Any]]) -> None:
                 entry = zipfile.ZipInfo(f"{name}.npy", _EPOCH)
                 entry.compress_type = zipfile.ZIP_DEFLATED
                 buffer = io.BytesIO()
-                np.lib.format.write_array(buffer, np.ascontiguousarray(arrays[name]), allow_pickle=False)
+                np.lib.format.write_array(buffer, np.asarray(arrays[name], order="C"), allow_pickle=False)
                 archive.writestr(entry, buffer.getvalue())
 
     write_atomically(path, write)

@@ -46,7 +46,7 @@ def check_value(name: str, value: Any, annotation: Any) -> Any:
         raise ConfigError(f"{name} must be given: type {name}=VALUE ({describe(annotation)})")
     try:
         return _convert(value, annotation)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, ArithmeticError) as error:
         raise ConfigError(f"{name} must be {describe(annotation)}, got {value!r}") from error
 
 

@@ -49,10 +49,11 @@ def imports(file: Path) -> Iterator[tuple[str, bool]]:
             yield from ((alias.name, id(node) in typing_only) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{file}: relative import"
-            yield str(node.module), id(node) in typing_only
-            for alias in node.names:
-                if (PACKAGE.parent / str(node.module).replace(".", "/") / f"{alias.name}.py").is_file():
-                    yield f"{node.module}.{alias.name}", id(node) in typing_only
+            folder = PACKAGE.parent / str(node.module).replace(".", "/")
+            inner = [alias.name for alias in node.names if (folder / f"{alias.name}.py").is_file()]
+            yield from ((f"{node.module}.{name}", id(node) in typing_only) for name in inner)
+            if len(inner) < len(node.names):
+                yield str(node.module), id(node) in typing_only
 
 
 def part_of(module: str) -> str:

@@ -104,6 +104,7 @@ class Frontier:
     commit_m: float = 1.0
     hysteresis: float = 2.0
     visited_m: float = 0.5
+    escape_m: float = 0.6
     set_aside_s: float = 10.0
     _height_m: float = field(init=False, repr=False, default=0.0)
     _current: Goal | None = field(init=False, repr=False, default=None)
@@ -122,6 +123,7 @@ class Frontier:
             min_clearance_m=self.min_clearance_m,
             cell_m=self.cell_m,
             visited_m=self.visited_m,
+            escape_m=self.escape_m,
         )
         require_non_negative(
             alpha=self.alpha,
@@ -196,6 +198,8 @@ class Frontier:
         clear = inside & (planar.clearance > self.min_clearance_m)
         unit = np.full(planar.state.shape, 100, dtype=np.int32)
         vehicle = planar.cell_of(observation.state.position_m)
+        # Nearer to an obstacle than d_min, the vehicle must still find its way out.
+        clear |= inside & (planar.clearance > 0.0) & _within(planar, vehicle, self.escape_m)
         known = from_vehicle = path_lengths(clear & (planar.state == FREE), unit, vehicle)
         if self.unknown is Unknown.OPTIMISTIC:
             dear = np.int32(round(100 * self.unknown_cost))
@@ -293,6 +297,12 @@ def _inside(planar: PlanarMap, bounds_m: Float) -> Bool:
     within_y = (y >= bounds_m[0, 1]) & (y <= bounds_m[1, 1])
     inside: Bool = within_x[:, None] & within_y[None, :]
     return inside
+
+
+def _within(planar: PlanarMap, cell: tuple[int, int], radius_m: float) -> Bool:
+    i, j = np.ogrid[: planar.state.shape[0], : planar.state.shape[1]]
+    near: Bool = (i - cell[0]) ** 2 + (j - cell[1]) ** 2 <= (radius_m / planar.cell_m) ** 2
+    return near
 
 
 def _arrival_heading(from_vehicle: Float32, cell: tuple[int, int]) -> float:

@@ -7,10 +7,10 @@ D <- (w D + d) / (w + 1) with capped w (Curless and Levoy 1996), and judged:
 - The judged value is the fused D while d agrees with it, so that the sensor's noise is
   averaged out, and d itself where the two contradict each other, so that what appears or
   disappears is not held back by a long history.
-- Below `occupied_below_m` it is a hit, above `free_above_m` a miss, in between neither. Hits
-  and misses move a small clamped counter (as the clamped log-odds of Hornung et al. 2013);
-  a voxel becomes occupied when the counter reaches `occupied_evidence` and ceases to be
-  when it is back at zero. One hit is not enough, so a speckle makes no obstacle; a voxel hit
+- Below `occupied_below_m` it is a hit, above `free_above_m` a miss; in between a miss for a
+  voxel that is not occupied, and neither for one that is. Hits and misses move a small clamped
+  counter (as the clamped log-odds of Hornung et al. 2013); a voxel becomes occupied when the
+  counter reaches `occupied_evidence` and ceases to be when it is back at zero. One hit is not enough, so a speckle makes no obstacle; a voxel hit
   once is not called free either, so no first sight of a surface is lost. A hit counts more
   than a miss: an object narrower than a pixel, hit in a third of the frames, stands.
 - The two limits lie 3/4 of a voxel apart and their sum exceeds a voxel. So a board thinner
@@ -20,8 +20,10 @@ D <- (w D + d) / (w + 1) with capped w (Curless and Levoy 1996), and judged:
   beyond which distances along the axis exceed twice the true ones.
 - What lies more than `free_above_m` behind a surface is only inferred to be solid: it does not
   overwrite a voxel that was measured to be free. Without this, a thin wall seen from behind
-  fills the room in front of it. Further behind than the truncation nothing is touched, and
-  stays unknown.
+  fills the room in front of it.
+- Deeper than `solid_depth_m` behind a surface nothing is judged, and beyond the truncation
+  nothing is touched: it stays unknown. The margin between the two keeps noise from deepening
+  walls layer by layer, as voxels just beyond the truncation are touched now and then.
 """
 
 from __future__ import annotations
@@ -50,6 +52,7 @@ class Rule(NamedTuple):
     max_weight: int
     occupied_below_m: float
     free_above_m: float
+    solid_depth_m: float
     hit_evidence: int
     miss_evidence: int
     occupied_evidence: int
@@ -74,11 +77,13 @@ def judge(
     """Return a voxel's byte after one observation: evidence and state moved, list bit kept."""
     agrees = weight_before == 0 or abs(observed_m - fused_before_m) <= rule.free_above_m
     judged = fused_m if agrees else observed_m
+    if judged < -rule.solid_depth_m:
+        return byte
     evidence = byte >> _EVIDENCE
     state = byte & _STATE
     if judged < rule.occupied_below_m:
         evidence = min(evidence + rule.hit_evidence, rule.max_evidence)
-    elif judged > rule.free_above_m:
+    elif judged > rule.free_above_m or state != _OCCUPIED:
         evidence = max(evidence - rule.miss_evidence, 0)
     if evidence >= rule.occupied_evidence:
         state = _OCCUPIED
@@ -175,6 +180,11 @@ def check_rule(rule: Rule) -> None:
         "-truncation_m < occupied_below_m < free_above_m < truncation_m must hold, got "
         f"truncation_m {rule.truncation_m}, occupied_below_m {rule.occupied_below_m}, "
         f"free_above_m {rule.free_above_m}",
+    )
+    require(
+        0.0 < rule.solid_depth_m <= rule.truncation_m and rule.occupied_below_m > -rule.solid_depth_m,
+        "0 < solid_depth_m <= truncation_m and occupied_below_m > -solid_depth_m must hold, got "
+        f"solid_depth_m {rule.solid_depth_m}",
     )
     require(1 <= rule.max_weight <= 255, f"max_weight must be in 1..255, got {rule.max_weight}")
     require(

@@ -21,6 +21,7 @@ class MapParameters:
     max_distance_m: float = 2.0
     occupied_below_m: float = 0.025
     free_above_m: float = 0.10
+    solid_depth_m: float = 0.25
     hit_evidence: int = 2
     miss_evidence: int = 1
     occupied_evidence: int = 4
@@ -48,6 +49,7 @@ class MapParameters:
             max_weight=self.max_weight,
             occupied_below_m=float(self.occupied_below_m),
             free_above_m=float(self.free_above_m),
+            solid_depth_m=float(self.solid_depth_m),
             hit_evidence=self.hit_evidence,
             miss_evidence=self.miss_evidence,
             occupied_evidence=self.occupied_evidence,

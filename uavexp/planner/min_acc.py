@@ -52,8 +52,8 @@ class MinAcc:
     duration_margin: float = 1.1
     control_spacing_m: float = 0.6
     first_iterations: int = 3
-    final_iterations: int = 5
-    tolerance: float = 0.003
+    final_iterations: int = 4
+    tolerance: float = 0.01
     path_clearance_weight: float = 2.0
     z_band_m: float = 0.3
     unknown: str = "optimistic"
@@ -77,7 +77,7 @@ class MinAcc:
         )
         require(
             self.safe_clearance_m > self.min_clearance_m,
-            f"safe_clearance_m must be > min_clearance_m = {self.min_clearance_m}, got {self.safe_clearance_m}",
+            f"safe_clearance_m must be > min_clearance_m ({self.min_clearance_m}), got {self.safe_clearance_m}",
         )
         require(
             1.0 <= self.duration_margin <= 10.0,
@@ -192,6 +192,4 @@ class MinAcc:
             return spent
         joined = join(brake, onward.trajectory)
         path = np.concatenate([request.position_m[None], onward.path_m])
-        return replace(
-            spent, status=PlanStatus.OK, trajectory=joined, path_m=path, reason="brakes first"
-        )
+        return replace(spent, status=PlanStatus.OK, trajectory=joined, path_m=path, reason="brakes first")

@@ -24,7 +24,7 @@ from uavexp.types import Float, PlanRequest, PlanStatus
 
 CONTROL_POINTS = range(10, 41, 2)  # the numbers that are used
 _SMOOTHING_ROUNDS = 10  # takes the staircase out of a voxel path
-_TANGENT_M = 0.5  # length over which the path's first and last direction is taken
+_TANGENT_M = 1.0  # length over which the path's first and last direction is taken
 _START_EXCESS = 1.1  # a start beyond a limit by more than this factor is refused
 _QP_SHARE = 0.96  # of the limits inside the QP: room for its linearisation
 _STRETCH = 1.06  # least factor by which a duration is stretched
@@ -33,7 +33,8 @@ _RETIME = 0.03  # relative change of duration that is worth placing the control 
 _HARD_ABOVE_VOXELS = 0.5  # the steep part of the obstacle cost begins this far above the hard limit
 _START_SLACK_M = 0.01  # by which a start below the hard limit may come closer still
 _REST_MPS = 0.05  # a slower start counts as standing
-_UNKNOWN_TETHER = 400.0  # of samples in unknown space, when that is not to be entered
+_UNKNOWN_TETHER = 400.0  # of samples within a voxel of unknown space, when that is not to be entered
+_AROUND = np.vstack([np.zeros(3), np.eye(3), -np.eye(3)])
 
 
 class Rung(NamedTuple):
@@ -231,10 +232,9 @@ class _Shaper:
         model, field = self.model, self.problem.field
         for _ in range(rounds):
             self._set_tether(control)
-            local = (
-                (h, model.energy, model.position, field.distance, field.origin_m, field.voxel_size_m)
-                + (self.weights, self.tether, self.tether_weight, self.limits)
-            )
+            grid = (field.distance, field.origin_m, field.voxel_size_m)
+            pull = (self.weights, self.tether, self.tether_weight, self.limits)
+            local = (h, model.energy, model.position, *grid, *pull)
             hessian, gradient = quadratic_model(control, *local)
             rows, sides = limit_rows(control, h, self.limits, self.problem.bounds)
             none = np.zeros(len(sides), dtype=np.int32)
@@ -256,7 +256,10 @@ class _Shaper:
         self.tether = self.problem.raw[np.argmin(apart, axis=1)]
         self.tether_weight = np.full(len(points), self.rung.tether)
         if self.settings.known_only:
-            self.tether_weight[~self.problem.field.observed(points)] += _UNKNOWN_TETHER
+            reach = self.problem.field.voxel_size_m * _AROUND
+            around = (points[:, None, :] + reach).reshape(-1, 3)
+            known = self.problem.field.observed(around).reshape(-1, len(_AROUND)).all(axis=1)
+            self.tether_weight[~known] += _UNKNOWN_TETHER
 
     def _excess(self, curve: Curve) -> float:
         """By what factor the duration is too short; <= 1 when the limits are kept."""
@@ -269,7 +272,7 @@ class _Shaper:
         top = max(settings.max_speed, unavoidable) * (1.0 + 1e-9)
         most = max(settings.max_acceleration, strong) * (1.0 + 1e-9)
         return max(
-            peak_speed(curve.control, curve.h) / top,
+            float(peak_speed(curve.control, curve.h)) / top,
             math.sqrt(peak_acceleration(curve.control, curve.h) / most),
         )
 

@@ -24,9 +24,18 @@ _HARD_STARTS = 4  # first accelerations, where a moving start leaves the least f
 # half spaces around a vector, in (along, level across, up from both): towards it and 24° from it,
 # then to the other sides as well
 _FAN = np.array(
-    [[1.0, 0.0, 0.0], [0.91, 0.4146083, 0.0], [0.91, -0.4146083, 0.0], [0.91, 0.0, 0.4146083]]
-    + [[0.91, 0.0, -0.4146083], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]
-    + [[-1.0, 0.0, 0.0]]
+    [
+        [1.0, 0.0, 0.0],
+        [0.91, 0.4146083, 0.0],
+        [0.91, -0.4146083, 0.0],
+        [0.91, 0.0, 0.4146083],
+        [0.91, 0.0, -0.4146083],
+        [0.0, 1.0, 0.0],
+        [0.0, -1.0, 0.0],
+        [0.0, 0.0, 1.0],
+        [0.0, 0.0, -1.0],
+        [-1.0, 0.0, 0.0],
+    ]
 )
 
 
@@ -266,12 +275,9 @@ def line_search(
     tether_weight: Float,
     limits: Float,
 ) -> tuple[Float, float]:
-    """First of a few shares of a QP's step (n, 3) that lowers the merit, and by what share.
+    """First of a few shares of a QP's step (n, 3) that lowers the merit, and by what share of it.
 
-    Args:
-        control: (N, 3).
-        step: of the free control points.
-        h: and the rest: see `merit`.
+    `control` (N, 3) are all control points, `step` moves the free ones; the rest: see `merit`.
     """
     last = control.shape[0] - 3
     grid = (distance, origin_m, voxel_m)

@@ -23,6 +23,7 @@ import numba as nb
 import numpy as np
 
 from uavexp.mapping.base import DistanceField
+from uavexp.planner.heap import pop, sift_up
 from uavexp.types import Float, Float32, Int, Int32, PlanStatus, UInt8
 
 # place of a cell in the heap, or one of these
@@ -37,45 +38,6 @@ _LENGTHS = np.sqrt((_STEPS**2).sum(axis=1).astype(np.float64))
 
 _RESERVE_VOXELS = 0.25  # clearance of cells above the limit: for diagonal steps, and the curve's freedom
 _FOUND, _NO_PATH, _BUDGET = 0, 1, 2
-
-
-@nb.njit(cache=True, inline="always")
-def _sift_up(heap: Int32, place: Int32, key: Float, position: int) -> None:
-    cell = heap[position]
-    while position > 0:
-        above = (position - 1) >> 1
-        if key[heap[above]] <= key[cell]:
-            break
-        heap[position] = heap[above]
-        place[heap[position]] = position
-        position = above
-    heap[position] = cell
-    place[cell] = position
-
-
-@nb.njit(cache=True, inline="always")
-def _pop(heap: Int32, place: Int32, key: Float, size: int) -> int:
-    """Take the cell of least key out of a heap of `size` cells and mark it closed (-1)."""
-    top = heap[0]
-    place[top] = -1
-    last = heap[size - 1]
-    size -= 1
-    if size > 0:
-        position = 0
-        while True:
-            child = 2 * position + 1
-            if child >= size:
-                break
-            if child + 1 < size and key[heap[child + 1]] < key[heap[child]]:
-                child += 1
-            if key[heap[child]] >= key[last]:
-                break
-            heap[position] = heap[child]
-            place[heap[position]] = position
-            position = child
-        heap[position] = last
-        place[last] = position
-    return int(top)
 
 
 @nb.njit(cache=True, inline="always")
@@ -108,13 +70,24 @@ def _limit(rule: Float, distance_voxels_squared: float) -> float:
     return min(rule[0], rule[4]) if distance_voxels_squared <= rule[5] else rule[0]
 
 
-@nb.njit(cache=True, inline="always")
+@nb.njit(cache=True)
 def _clearance(
-    distance: Float32, state: UInt8, known_only: bool, i: int, j: int, k: int
+    distance: Float32, state: UInt8, known_only: bool, rule: Float, i: int, j: int, k: int
 ) -> float:
-    if known_only and state[i, j, k] == 0:
+    """Clearance of a cell; where unknown is closed: none in it, and the least allowed next to it."""
+    here = float(distance[i, j, k])
+    if not known_only:
+        return here
+    if state[i, j, k] == 0:
         return -np.inf
-    return float(distance[i, j, k])
+    for axis in range(3):
+        for side in (-1, 1):
+            ni = min(max(i + (side if axis == 0 else 0), 0), state.shape[0] - 1)
+            nj = min(max(j + (side if axis == 1 else 0), 0), state.shape[1] - 1)
+            nk = min(max(k + (side if axis == 2 else 0), 0), state.shape[2] - 1)
+            if state[ni, nj, nk] == 0:
+                return min(here, rule[0])
+    return here
 
 
 @nb.njit(cache=True)
@@ -144,13 +117,13 @@ def _plan_columns(
     key[source] = _octile_2d(goal[0] - start[0], goal[1] - start[1])
     best = -np.inf
     for k in range(k0, k1 + 1):
-        best = max(best, _clearance(distance, state, known_only, goal[0], goal[1], k))
+        best = max(best, _clearance(distance, state, known_only, rule, goal[0], goal[1], k))
     clearance[source] = best
     heap[0] = source
     place[source] = 0
     size, expansions = 1, 0
     while size > 0:
-        cell = _pop(heap, place, key, size)
+        cell = pop(heap, place, key, size)
         size -= 1
         expansions += 1
         if cell == target:
@@ -166,7 +139,7 @@ def _plan_columns(
                 if stamp[other] != generation:
                     best = -np.inf
                     for k in range(k0, k1 + 1):
-                        best = max(best, _clearance(distance, state, known_only, i, j, k))
+                        best = max(best, _clearance(distance, state, known_only, rule, i, j, k))
                     apart = float((i - start[0]) ** 2 + (j - start[1]) ** 2)
                     stamp[other] = generation
                     clearance[other] = best
@@ -183,7 +156,7 @@ def _plan_columns(
                         size += 1
                     cost[other] = there
                     key[other] = there + _octile_2d(i - start[0], j - start[1])
-                    _sift_up(heap, place, key, place[other])
+                    sift_up(heap, place, key, place[other])
     return _NO_PATH, np.inf, expansions
 
 
@@ -222,7 +195,7 @@ def _plan_cells(
     place[source] = 0
     size, expansions = 1, 0
     while size > 0:
-        cell = _pop(heap, place, key, size)
+        cell = pop(heap, place, key, size)
         size -= 1
         if cell == target:
             return _FOUND, cost[cell], expansions
@@ -232,13 +205,13 @@ def _plan_cells(
         ck = cell % nk + k0
         cj = (cell // nk) % nj + j0
         ci = cell // (nk * nj) + i0
-        here = _penalty(_clearance(distance, state, known_only, ci, cj, ck), rule)
+        here = _penalty(_clearance(distance, state, known_only, rule, ci, cj, ck), rule)
         for n in range(26):
             i, j, k = ci + _STEPS[n, 0], cj + _STEPS[n, 1], ck + _STEPS[n, 2]
             if i < i0 or i > i1 or j < j0 or j > j1 or k < k0 or k > k1:
                 continue
             other = ((i - i0) * nj + j - j0) * nk + k - k0
-            clearance = _clearance(distance, state, known_only, i, j, k)
+            clearance = _clearance(distance, state, known_only, rule, i, j, k)
             if stamp[other] != generation:
                 apart = float((i - start[0]) ** 2 + (j - start[1]) ** 2 + (k - start[2]) ** 2)
                 stamp[other] = generation
@@ -246,7 +219,7 @@ def _plan_cells(
                 place[other] = -2 if clearance < _limit(rule, apart) and other != target else -3
             if place[other] == -1 or place[other] == -2:  # closed or blocked
                 continue
-            if not cut_corners and _cuts_corner(distance, state, known_only, rule[0], ci, cj, ck, n):
+            if not cut_corners and _cuts_corner(distance, state, known_only, rule, ci, cj, ck, n):
                 continue
             there = cost[cell] + _LENGTHS[n] * (1.0 + 0.5 * (here + _penalty(clearance, rule)))
             if there < cost[other]:
@@ -263,22 +236,20 @@ def _plan_cells(
                 cost[other] = there
                 parent[other] = n
                 key[other] = there + _TIE * bound
-                _sift_up(heap, place, key, place[other])
+                sift_up(heap, place, key, place[other])
     return _NO_PATH, np.inf, expansions
 
 
 @nb.njit(cache=True, inline="always")
 def _cuts_corner(
-    distance: Float32, state: UInt8, known_only: bool, limit: float, i: int, j: int, k: int, n: int
+    distance: Float32, state: UInt8, known_only: bool, rule: Float, i: int, j: int, k: int, n: int
 ) -> bool:
     """Whether a cell of the box that the step moves through is blocked."""
     for a in range(2):
         for b in range(2):
             for c in range(2):
-                at = _clearance(
-                    distance, state, known_only, i + a * _STEPS[n, 0], j + b * _STEPS[n, 1], k + c * _STEPS[n, 2]
-                )
-                if at < limit:
+                at_i, at_j, at_k = i + a * _STEPS[n, 0], j + b * _STEPS[n, 1], k + c * _STEPS[n, 2]
+                if _clearance(distance, state, known_only, rule, at_i, at_j, at_k) < rule[0]:
                     return True
     return False
 
@@ -330,7 +301,9 @@ class PathSearch:
         if here <= 0.0:
             return _failed(PlanStatus.START_BLOCKED, f"the start lies {-here:.2f} m inside an obstacle")
         if there < self.min_clearance_m or np.any(goal_m < bounds_m[0]) or np.any(goal_m > bounds_m[1]):
-            return _failed(PlanStatus.GOAL_BLOCKED, f"the goal's clearance is {there:.2f} m, or it is outside")
+            return _failed(
+                PlanStatus.GOAL_BLOCKED, f"the goal's clearance is {there:.2f} m, or it is outside"
+            )
         box = self._box(field_, start_m, goal_m, bounds_m)
         start = np.clip(_voxel(field_, start_m), box[0], box[1])
         goal = np.clip(_voxel(field_, goal_m), box[0], box[1])
@@ -374,7 +347,9 @@ class PathSearch:
         known = (field_.distance, field_.state, self.known_only)
         status, total, planar_expansions = _plan_columns(*known, *common, *self._columns)
         if status != _FOUND:
-            return _failed(PlanStatus.NO_PATH, "start and goal are not joined at the clearance limit", planar_expansions)
+            return _failed(
+                PlanStatus.NO_PATH, "start and goal are not joined at the clearance limit", planar_expansions
+            )
         cut_corners = self.min_clearance_m >= 0.5 * np.sqrt(3.0) * field_.voxel_size_m
         planar = (total, self._columns[0], self._columns[3], self._columns[4])
         status, cost, expansions = _plan_cells(

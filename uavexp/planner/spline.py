@@ -95,7 +95,7 @@ def peak_acceleration(control: Float, h: float) -> float:
         for axis in range(3):
             square += (control[i, axis] - 2.0 * control[i + 1, axis] + control[i + 2, axis]) ** 2
         peak = max(peak, square)
-    return np.sqrt(peak) / (h * h)
+    return float(np.sqrt(peak) / (h * h))
 
 
 @nb.njit(cache=True)
@@ -122,7 +122,7 @@ def peak_speed(control: Float, h: float) -> float:
                 at_middle += (v + 0.5 * w * slope) ** 2
                 at_end += (v + w * slope + 0.5 * w * w * bend) ** 2
             peak = max(peak, at_start, at_middle, at_end)
-    return np.sqrt(peak) / h
+    return float(np.sqrt(peak) / h)
 
 
 @nb.njit(cache=True)

@@ -70,8 +70,8 @@ def _beside(aspect: float) -> Page:
         plan=(LEFT_IN, BOTTOM_IN, plan_width, SIDE_PLAN_HEIGHT_IN),
         clearance=(x, clearance_y, width, panel),
         tracking=(x, BOTTOM_IN, width, panel),
-        speed_bar=(x + 0.05, clearance_y + panel + 0.65, 1.7, 0.1),
-        legend=(x - 0.1, top + 0.05),
+        speed_bar=(x + 0.05, clearance_y + panel + 0.7, 1.7, 0.1),
+        legend=(x - 0.1, top - 0.05),
         columns=2,
     )
 

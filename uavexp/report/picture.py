@@ -48,7 +48,7 @@ def draw(world: World, log: TrialLog, metrics: Values, title: str, path: Path) -
         _draw_speed_bar(sheet.speed_bar, speed_scale)
         _draw_clearance(sheet.clearance, log, _number(metrics, "safety_threshold_m"))
         _draw_tracking(sheet.tracking, log)
-        _draw_legend(sheet, log)
+        _draw_legend(sheet, world, log)
         _draw_header(sheet, world, log, metrics, title)
         sheet.figure.savefig(path, dpi=DPI, format="png", metadata={"Software": None})
 
@@ -124,14 +124,15 @@ def _finish_panel(axes: Axes, log: TrialLog, *, legend: bool = True) -> None:
         )
 
 
-def _draw_legend(sheet: page.Page, log: TrialLog) -> None:
+def _draw_legend(sheet: page.Page, world: World, log: TrialLog) -> None:
+    low_m, high_m = plan_view.band_m(world)
     handles = [
         Line2D([], [], color=plan_view.SPEED_COLOURS(0.7), lw=2.2, label="flown"),
         Line2D([], [], color=style.BLACK, lw=0.9, ls="--", label="true shortest path"),
         Line2D([], [], color=style.SKY, lw=1.0, label="plans"),
-        Patch(color=style.SURFACE, label="true surfaces"),
-        Patch(color=style.SOLID, label="solid or shut off"),
-        Line2D([], [], color=style.MAPPED, marker="s", ls="", ms=3, mew=0, label="mapped as occupied"),
+        Patch(color=style.SURFACE, label=f"true, z {low_m:.1f} to {high_m:.1f} m"),
+        Patch(color=style.SOLID, label="solid or shut off there"),
+        Line2D([], [], color=style.MAPPED, marker="s", ls="", ms=3, mew=0, label="mapped there"),
         Line2D([], [], color="white", marker="o", ls="", mec=style.BLACK, mew=1.3, ms=7, label="start"),
         Line2D(
             [], [], color=style.YELLOW, marker="*", ls="", mec=style.BLACK, mew=0.8, ms=12, label="target"

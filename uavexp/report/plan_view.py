@@ -35,7 +35,7 @@ def view_m(world: World, log: TrialLog) -> Float:
 
 def draw(axes: Axes, world: World, log: TrialLog, view: Float) -> Normalize:
     """Draw the plan on `axes`; return the scale of the path's colours, m/s."""
-    heights_m = _band_m(world)
+    heights_m = band_m(world)
     _draw_truth(axes, world, log, heights_m)
     _draw_mapped(axes, log, heights_m, view)
     axes.plot(world.shortest_path[:, 0], world.shortest_path[:, 1], "--", color=style.BLACK, lw=0.9, zorder=4)
@@ -45,7 +45,7 @@ def draw(axes: Axes, world: World, log: TrialLog, view: Float) -> Normalize:
     scale = _draw_path(axes, log)
     _draw_events(axes, log)
     _draw_task(axes, world)
-    axes.set(xlim=view[:, 0], ylim=view[:, 1], aspect="equal", xlabel="x [m]", ylabel="y [m]")
+    axes.set(xlim=view[:, 0], ylim=view[:, 1], aspect="equal", anchor="N", xlabel="x [m]", ylabel="y [m]")
     tick_m = _tick_m(float(np.max(view[1] - view[0])))
     axes.xaxis.set_major_locator(MultipleLocator(tick_m))
     axes.yaxis.set_major_locator(MultipleLocator(tick_m))
@@ -65,7 +65,7 @@ def _visited_m(world: World, log: TrialLog) -> Float:
     return np.concatenate([ends, world.shortest_path.reshape(-1, 3), log.position_m.reshape(-1, 3)])
 
 
-def _band_m(world: World) -> tuple[float, float]:
+def band_m(world: World) -> tuple[float, float]:
     """Heights shown: around the start's, floor and ceiling left out by the flight bounds."""
     height_m = float(world.start_m[2])
     lowest_m, highest_m = world.flight_bounds_m[:, 2]
@@ -83,7 +83,8 @@ def _draw_truth(axes: Axes, world: World, log: TrialLog, heights_m: tuple[float,
         vmax=2,
         origin="lower",
         extent=(plan.lower_m[0], plan.upper_m[0], plan.lower_m[1], plan.upper_m[1]),
-        interpolation="nearest",
+        interpolation="antialiased",
+        interpolation_stage="rgba",  # blend colours, never the classes themselves
         zorder=0,
     )
 

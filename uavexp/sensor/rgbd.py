@@ -2,8 +2,8 @@
 
 From the true depth z along the optical axis to the measured one, in this order:
 
-1. missing returns at grazing angles: none where the angle between the ray and the surface
-   normal exceeds `grazing_angle_deg`;
+1. missing returns at grazing angles: none where the angle between the ray and the normal of
+   a surface within range exceeds `grazing_angle_deg`;
 2. axial noise: z + N(0, sigma(z)), sigma(z) = 0.0012 + 0.0019 (z - 0.4)^2 m (Nguyen, Izadi
    and Lovell 2012, "Modeling Kinect Sensor Noise", axial noise up to 60°);
 3. disparity quantisation: d = f b / z rounded to a multiple of `disparity_step_px`
@@ -74,10 +74,7 @@ def _measure(
             if not true < np.inf:
                 measured[v, u] = np.inf
                 continue
-            n = v * width + u
-            dx, dy, dz = rays[n, 3], rays[n, 4], rays[n, 5]
-            along = abs(normal[n, 0] * dx + normal[n, 1] * dy + normal[n, 2] * dz)
-            if along < least_cosine * math.sqrt(dx * dx + dy * dy + dz * dz):
+            if true <= max_range_m and _is_grazed(normal, rays, v * width + u, least_cosine):
                 measured[v, u] = np.nan
                 continue
             depth = true + axial_scale * (0.0012 + 0.0019 * (true - 0.4) ** 2) * gaussian[v, u]
@@ -90,6 +87,14 @@ def _measure(
                 depth = np.inf
             measured[v, u] = depth
     return measured
+
+
+@nb.njit(cache=True)
+def _is_grazed(normal: Float32, rays: Float32, n: int, least_cosine: float) -> bool:
+    """Whether ray n meets its surface at less than a cosine to the normal."""
+    dx, dy, dz = rays[n, 3], rays[n, 4], rays[n, 5]
+    along = abs(normal[n, 0] * dx + normal[n, 1] * dy + normal[n, 2] * dz)
+    return bool(along < least_cosine * math.sqrt(dx * dx + dy * dy + dz * dz))
 
 
 @nb.njit(cache=True)

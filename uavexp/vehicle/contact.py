@@ -4,17 +4,18 @@ The velocity into a surface is lost, the rest slides along; the box never passes
 and never ends overlapping when it began free. [ours]: paper 1 counts contacts and does not
 say what they do to the flight.
 
-Method: the body at the begin of the step is free, so at every place where box and scene
-are locally nearest, found by projecting to and fro between the two, the plane through the
-scene's point across the gap has the whole box on one side. The box at the end of the step
-must stay on that side: half-spaces for the displacement (through the support of the turned
-box, which pushes it off when it turns against a wall) and for the velocity. Both are
-projected on them. An exact test of the outcome decides; what still touches is cut short,
-down to the pose before at rest.
+Method: the body at the begin of the step is free, so at a place where box and scene are
+locally nearest, found by projecting to and fro between the two, the plane through the
+scene's point across the gap has the box on one side. The box at the end of the step must
+stay on that side: half-spaces for the displacement (through the reach of the turned box,
+which pushes it off when it turns against a wall) and for the velocity. Both are projected
+on them. An exact test of the outcome decides; what still touches is cut short, down to the
+pose before at rest.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import TYPE_CHECKING
@@ -28,8 +29,10 @@ from uavexp.types import Contact, Float, State
 if TYPE_CHECKING:
     from uavexp.scene import Scene
 
-_SKIN_M = 1e-3  # gap left after a contact: distances are float32, normals need some room
-_ROUNDS = 6  # of projections between box and scene, and over the half-spaces
+_SKIN_M = 1e-3  # gap left after a contact: points of the scene are float32
+_LEAST_GAP_M = 5e-3  # below it, the direction across the gap is off by a thousandth or more
+_CORE = 0.3  # depth of the inner box under the faces, as a share of the smallest half size
+_ROUNDS = 6  # of projections between box and scene
 # starting points of the search for near places, in half sizes: centre, faces, corners
 _STARTS = np.array([p for p in product((-1.0, 0.0, 1.0), repeat=3) if sum(map(abs, p)) in (0.0, 1.0, 3.0)])
 
@@ -74,18 +77,40 @@ def _slide(displacement: Float, velocity: Float, normal: Float, least: Float) ->
                     velocity[axis] -= into * normal[i, axis]
 
 
-def _near_places(scene: Scene, centre_m: Float, rotation: Float, half_m: Float) -> tuple[Float, Float]:
-    """Scene points (N, 3) locally nearest to a free box, and unit normals (N, 3) towards the box."""
+def _near_places(
+    scene: Scene, centre_m: Float, rotation: Float, half_m: Float
+) -> Iterator[tuple[Float, Float]]:
+    """Scene points (N, 3) locally nearest to a free box, unit normals (N, 3) to the box; best guess first.
+
+    A very small gap has hardly a direction in float32. The first guess takes that direction
+    from a smaller box inside, which is exact but where a corner of the scene meets the rim
+    of a face; the second from the box itself.
+    """
+    point, across = _search(scene, centre_m, rotation, half_m)
+    small = np.linalg.norm(across, axis=1) < _LEAST_GAP_M
+    if small.any():
+        inner_point, inner_across = _search(scene, centre_m, rotation, half_m - _CORE * half_m.min())
+        yield _planes(
+            np.where(small[:, None], inner_point, point), np.where(small[:, None], inner_across, across)
+        )
+    yield _planes(point, across)
+
+
+def _planes(point: Float, across: Float) -> tuple[Float, Float]:
+    """Points and unit normals, without those that have no direction (the box overlapped before)."""
+    gap = np.linalg.norm(across, axis=1)
+    apart = gap > 1e-6
+    return point[apart], across[apart] / gap[apart, None]
+
+
+def _search(scene: Scene, centre_m: Float, rotation: Float, half_m: Float) -> tuple[Float, Float]:
+    """Scene points (N, 3) locally nearest to a box, and the ways (N, 3) from them to the box."""
     inside = centre_m + (_STARTS * half_m) @ rotation.T
     for _ in range(_ROUNDS):
         outside = scene.closest_point_m(inside)
         _nearest_in_box(outside, centre_m, rotation, half_m, inside)
     outside = scene.closest_point_m(inside)
-    across = inside - outside
-    gap = np.linalg.norm(across, axis=1)
-    # gaps of float32's own size have no direction: take the centre's
-    across = np.where((gap > 1e-5)[:, None], across, centre_m - outside)
-    return outside, across / np.linalg.norm(across, axis=1, keepdims=True)
+    return outside, inside - outside
 
 
 def _between(before: State, after: State, share: float) -> State:
@@ -107,17 +132,23 @@ def _stopped(before: State, after: State, scene: Scene, size_m: Float) -> State:
     """Return where the motion from free `before` to touching `after` ends: free, slid along the surface."""
     rotation = rotation_from_quaternion(after.quaternion_wxyz)
     start_rotation = rotation_from_quaternion(before.quaternion_wxyz)
-    point, normal = _near_places(scene, before.position_m, start_rotation, 0.5 * size_m)
-    support = np.abs(normal @ rotation) @ (0.5 * size_m)
-    least = support + _SKIN_M - np.sum(normal * (before.position_m - point), axis=1)
-    displacement = after.position_m - before.position_m
-    velocity = after.velocity_mps.copy()
-    _slide(displacement, velocity, normal, least)
-    slid = replace(after, position_m=before.position_m + displacement, velocity_mps=velocity)
-    for share in (1.0, 0.5, 0.25, 0.125):
-        end = _between(before, slid, share)
-        if not _touches(end, scene, size_m):
-            return end
+    guesses = []
+    for point, normal in _near_places(scene, before.position_m, start_rotation, 0.5 * size_m):
+        reach, start_reach = (np.abs(normal @ r) @ (0.5 * size_m) for r in (rotation, start_rotation))
+        gap = np.sum(normal * (before.position_m - point), axis=1) - start_reach
+        # where the plane cuts a corner of the box, it may not come nearer: nothing pushes it off
+        least = reach - start_reach + np.where(gap > 0.0, _SKIN_M - gap, 0.0)
+        displacement, velocity = after.position_m - before.position_m, after.velocity_mps.copy()
+        _slide(displacement, velocity, normal, least)
+        slid = replace(after, position_m=before.position_m + displacement, velocity_mps=velocity)
+        if not _touches(slid, scene, size_m):
+            return slid
+        guesses.append(slid)
+    for share in (0.5, 0.25, 0.125):
+        for slid in guesses:
+            end = _between(before, slid, share)
+            if not _touches(end, scene, size_m):
+                return end
     return replace(before, velocity_mps=np.zeros(3), body_rate_radps=np.zeros(3))
 
 

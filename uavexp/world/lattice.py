@@ -199,12 +199,12 @@ def _column_bound(
     bound = np.full(shape[0] * shape[1], np.inf)
     closed = np.zeros(shape[0] * shape[1], dtype=np.bool_)
     wanted = np.zeros(shape[0] * shape[1], dtype=np.bool_)
-    heap = [(0.0, np.int64(0))]
+    heap = [(0.0, 0.0, np.int64(0))]  # the same type as the search's: compiled once
     heap.pop()
     for flat in ends:
         if bound[flat // shape[2]] > 0.0:
             bound[flat // shape[2]] = 0.0
-            heapq.heappush(heap, (0.0, flat // shape[2]))
+            heapq.heappush(heap, (0.0, 0.0, flat // shape[2]))
     missing = 0
     for flat in starts:
         missing += not wanted[flat // shape[2]]
@@ -212,7 +212,7 @@ def _column_bound(
     middle = starts[0] % shape[2]
     stopped = np.inf
     while len(heap) > 0 and missing > 0:
-        stopped, column = heapq.heappop(heap)
+        stopped, _, column = heapq.heappop(heap)
         if closed[column]:
             continue
         closed[column] = True
@@ -229,7 +229,7 @@ def _column_bound(
                     grid, low, cell, shape, radius, tested, ni, nj, middle
                 ):
                     bound[near] = longer
-                    heapq.heappush(heap, (longer, near))
+                    heapq.heappush(heap, (longer, 0.0, near))
     if missing > 0:
         stopped = np.inf
     return np.where(closed, bound, stopped)
@@ -383,12 +383,14 @@ def tighten(grid: TriangleGrid, points: Float, clearance: float) -> Float:
                 + (points[i, 2] - points[j, 2]) ** 2
             )
         length[j], before[j] = total[j - 1], j - 1
-        for i in np.argsort(total):
+        while True:
+            i = int(np.argmin(total))
             if total[i] >= length[j]:
                 break
             if in_sight(grid, points[i], points[j], clearance):
                 length[j], before[j] = total[i], i
                 break
+            total[i] = np.inf
     chain = np.empty_like(points)
     filled, here = 0, count - 1
     while here > 0:

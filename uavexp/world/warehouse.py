@@ -34,7 +34,8 @@ class Warehouse:
         rack_depth_m: depth of a rack row, m.
         cross_aisles: gaps in each row, besides its two free ends.
         load_share: share of shelf places that hold goods, 0 to 1.
-        clutter_per_m2: pallets, cartons and stacks on the floor per m² of hall, 1/m².
+        clutter_per_m2: pallets, cartons and stacks asked for per m² of hall, 1/m²; fewer where
+            racks or others are in the way.
         pillars: whether square pillars stand on a regular grid.
         ducts: number of ducts and beams that hang across the hall under the ceiling.
         flight_height_m: z of start and target, m.
@@ -46,7 +47,7 @@ class Warehouse:
     rack_depth_m: float = 1.0
     cross_aisles: int = 2
     load_share: float = 0.7
-    clutter_per_m2: float = 0.08
+    clutter_per_m2: float = 0.14
     pillars: bool = True
     ducts: int = 3
     flight_height_m: float = 1.2
@@ -80,13 +81,15 @@ class Warehouse:
         width = self.size_m[1]
         rows = int((width - self.aisle_m) / (self.rack_depth_m + self.aisle_m))
         aisle = (width - rows * self.rack_depth_m) / (rows + 1)
+        racks: list[tuple[float, float, float]] = []
         for row in range(rows):
             front = aisle + row * (self.rack_depth_m + aisle)
             for begin, end in self._stretches(rng):
                 self._rack(boxes, rng, begin, end, front)
+                racks.append((begin, end, front))
         if self.pillars:
             self._stand_pillars(boxes, rng)
-        self._litter(boxes, rng)
+        self._litter(boxes, rng, racks)
         self._hang_ducts(boxes, rng)
 
     def _stretches(self, rng: np.random.Generator) -> list[tuple[float, float]]:
@@ -147,7 +150,9 @@ class Warehouse:
             for y in np.arange(offset[1], width - 0.5, PILLAR_PITCH_M):
                 boxes.stand(x, y, (0.35, 0.35, height))
 
-    def _litter(self, boxes: Boxes, rng: np.random.Generator) -> None:
+    def _litter(
+        self, boxes: Boxes, rng: np.random.Generator, racks: list[tuple[float, float, float]]
+    ) -> None:
         """Things left in the aisles: empty and loaded pallets, cartons, tall stacks."""
         length, width, height = self.size_m
         taken: list[tuple[float, float, float]] = []
@@ -157,9 +162,10 @@ class Warehouse:
             long, deep = PALLET_M[0] * (0.5 + 0.5 * a), PALLET_M[1] * (0.5 + 0.5 * b)
             x = float(np.clip(x, LITTER_TO_WALL_M, length - LITTER_TO_WALL_M))
             y = float(np.clip(y, LITTER_TO_WALL_M, width - LITTER_TO_WALL_M))
-            if not indoor.apart(x, y, taken, 0.5 * np.hypot(long, deep) + CLUTTER_GAP_M):
+            radius = 0.5 * float(np.hypot(long, deep))
+            if self._in_rack(x, y, radius, racks) or not indoor.apart(x, y, taken, radius + CLUTTER_GAP_M):
                 continue
-            taken.append((x, y, 0.5 * float(np.hypot(long, deep))))
+            taken.append((x, y, radius))
             if kind < 0.25:  # empty pallets, one to six on top of one another
                 boxes.stand(x, y, (*PALLET_M[:2], PALLET_M[2] * (1 + int(6 * c))), yaw)
             elif kind < 0.6:  # a loaded pallet
@@ -170,6 +176,14 @@ class Warehouse:
             else:  # a post with a sign hung at head height, free below
                 boxes.stand(x, y, (long, 0.12, 0.5), yaw, min(1.5 + 0.6 * c, height - 0.6))
                 boxes.stand(x, y, (0.06, 0.06, height), yaw)
+
+    def _in_rack(self, x: float, y: float, radius: float, racks: list[tuple[float, float, float]]) -> bool:
+        """Whether a disc reaches into a rack (begin, end along x, front)."""
+        return any(
+            np.hypot(max(begin - x, 0.0, x - end), max(front - y, 0.0, y - front - self.rack_depth_m))
+            < radius
+            for begin, end, front in racks
+        )
 
     def _hang_ducts(self, boxes: Boxes, rng: np.random.Generator) -> None:
         length, width, height = self.size_m

@@ -1,0 +1,43 @@
+"""Options of a config group, found by glob, built from their own yaml."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+from hydra.utils import get_class
+from omegaconf import OmegaConf
+
+CONF = Path(__file__).resolve().parent.parent / "conf"
+
+
+def options(group: str) -> list[str]:
+    """Names of all options of a group."""
+    return sorted(path.stem for path in (CONF / group).glob("*.yaml"))
+
+
+def build(group: str, option: str, **changes: Any) -> Any:
+    """The component that an option's yaml describes."""
+    values = OmegaConf.to_container(OmegaConf.load(CONF / group / f"{option}.yaml"))
+    return get_class(values.pop("_target_"))(**(values | changes))
+
+
+def check_yaml(group: str, option: str) -> None:
+    """One name in every place; the yaml lists every parameter with the class's default, and comments it."""
+    path = CONF / group / f"{option}.yaml"
+    values = dict(OmegaConf.to_container(OmegaConf.load(path)))
+    target = values.pop("_target_")
+    assert target.rpartition(".")[0] == f"uavexp.{group}.{option}"
+    fields = {field.name: field for field in dataclasses.fields(get_class(target)) if field.init}
+    assert values.keys() == fields.keys()
+    for name, value in values.items():
+        default = fields[name].default
+        assert (tuple(value) if isinstance(value, list) else value) == default, name
+    lines = [line for line in path.read_text().splitlines() if line and not line.startswith(("_target_", "#"))]
+    assert all("#" in line for line in lines)
+
+
+def numbers(component: Any) -> list[str]:
+    """Names of the float parameters of a component."""
+    return [f.name for f in dataclasses.fields(component) if f.init and type(f.default) is float]

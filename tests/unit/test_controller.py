@@ -1,0 +1,172 @@
+"""The loop closed: tracking error, step response, hover and yaw with both vehicles."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from uavexp.controller.position_velocity import PositionVelocity
+from uavexp.errors import ConfigError
+from uavexp.geometry import rotation_from_quaternion, yaw_of
+from uavexp.types import Reference, State
+from uavexp.vehicle.point_mass import PointMass
+from uavexp.vehicle.quadrotor import Quadrotor
+
+VEHICLES = pytest.mark.parametrize("vehicle", [Quadrotor, PointMass])
+STEP_S = 0.01
+START = np.array([0.0, 0.0, 1.5])
+
+
+def figure_eight(t):
+    """Lemniscate at up to 2.44 m/s and 2.49 m/s²."""
+    a, b, w = 2.4, 1.1, 0.72
+    s, c, s2, c2 = np.sin(w * t), np.cos(w * t), np.sin(2 * w * t), np.cos(2 * w * t)
+    position = START + [a * s, b * s2, 0.1 * s]
+    return (
+        position,
+        w * np.array([a * c, 2 * b * c2, 0.1 * c]),
+        -(w**2) * np.array([a * s, 4 * b * s2, 0.1 * s]),
+    )
+
+
+def to_and_fro(t):
+    """Minimum jerk from rest to rest and back, 3.5 m in 2.85 s, then 1 s at rest."""
+    span, way = 2.85, np.array([3.0, 1.5, 1.0])
+    lap, since = divmod(t, span + 1.0)
+    x = min(since / span, 1.0)
+    sign = 1.0 if int(lap) % 2 == 0 else -1.0
+    begin = START if sign > 0 else START + way
+    return (
+        begin + sign * way * (10 * x**3 - 15 * x**4 + 6 * x**5),
+        sign * way * (30 * x**2 - 60 * x**3 + 30 * x**4) / span,
+        sign * way * (60 * x - 180 * x**2 + 120 * x**3) / span**2,
+    )
+
+
+def stand(position):
+    return lambda t: (np.asarray(position, dtype=np.float64), np.zeros(3), np.zeros(3))
+
+
+def fly(vehicle, path, seconds, *, latency_steps=0, yaw=lambda t: (0.0, 0.0), controller=None, start=None):
+    """Fly along a path; states and reference positions at the same instants."""
+    controller = controller or PositionVelocity()
+    position, velocity, _ = path(0.0)
+    state = State(
+        position_m=position.copy() if start is None else np.asarray(start, dtype=np.float64),
+        velocity_mps=velocity.copy(),
+        quaternion_wxyz=np.array([1.0, 0.0, 0.0, 0.0]),
+        body_rate_radps=np.zeros(3),
+    )
+    vehicle.reset(state)
+    controller.reset(vehicle.limits, vehicle.mass_kg)
+    states, wanted, commands = [], [], []
+    for k in range(round(seconds / STEP_S)):
+        position, velocity, acceleration = path(k * STEP_S)
+        heading, heading_rate = yaw(k * STEP_S)
+        reference = Reference(
+            position_m=position,
+            velocity_mps=velocity,
+            acceleration_mps2=acceleration,
+            yaw_rad=heading,
+            yaw_rate_radps=heading_rate,
+        )
+        states.append(state)
+        wanted.append(position)
+        commands.append(controller.command(state, reference))
+        state = vehicle.step(commands[max(0, k - latency_steps)], STEP_S)
+    return states, np.array(wanted)
+
+
+def rmse(states, wanted):
+    flown = np.array([s.position_m for s in states])
+    return float(np.sqrt(np.mean(np.sum((flown - wanted) ** 2, axis=1))))
+
+
+@pytest.mark.parametrize("latency_steps", [0, 1])
+@pytest.mark.parametrize("path", [figure_eight, to_and_fro])
+@VEHICLES
+def test_tracking_error_is_below_5_cm(vehicle, path, latency_steps):
+    samples = [path(t) for t in np.arange(0.0, 12.0, 0.01)]
+    assert 2.2 < max(np.linalg.norm(v) for _, v, _ in samples) <= 2.5
+    assert 2.2 < max(np.linalg.norm(a) for _, _, a in samples) <= 2.5
+    states, wanted = fly(vehicle(), path, 12.0, latency_steps=latency_steps)
+    settled = 100 if path is figure_eight else 0  # it begins at speed, but level
+    assert rmse(states[settled:], wanted[settled:]) < 0.05
+    assert np.abs([s.body_rate_radps for s in states]).max() < 2.0
+
+
+@VEHICLES
+def test_yawing_along_the_way_does_not_disturb_tracking(vehicle):
+    yaw = lambda t: (0.8 * np.sin(t), 0.8 * np.cos(t))  # noqa: E731
+    states, wanted = fly(vehicle(), to_and_fro, 10.0, yaw=yaw)
+    assert rmse(states, wanted) < 0.05
+    error = [yaw_of(s.quaternion_wxyz) - yaw(k * STEP_S)[0] for k, s in enumerate(states)]
+    assert np.abs(error[200:]).max() < 0.1
+
+
+@pytest.mark.parametrize("step_m", [(0.3, 0.0, 0.0), (3.0, 0.0, 0.0), (0.0, 1.0, 0.5), (0.0, 0.0, -1.0)])
+@VEHICLES
+def test_step_response_overshoots_little_and_settles(vehicle, step_m):
+    step = np.array(step_m)
+    states, _ = fly(vehicle(), stand(START + step), 9.0, start=START)
+    done = np.array([(s.position_m - START) @ step for s in states]) / (step @ step)
+    assert done.max() < 1.03
+    assert abs(done[-1] - 1.0) < 1e-4
+    assert np.linalg.norm([s.velocity_mps for s in states], axis=1).max() < 1.2
+
+
+@VEHICLES
+def test_stays_stable_with_a_latency_of_three_steps(vehicle):
+    states, _ = fly(vehicle(), stand(START + [1.0, 0.0, 0.0]), 10.0, latency_steps=3, start=START)
+    np.testing.assert_allclose(states[-1].position_m, START + [1.0, 0.0, 0.0], atol=1e-3)
+
+
+@VEHICLES
+def test_hovers_within_a_micrometre(vehicle):
+    states, wanted = fly(vehicle(), stand(START), 10.0)
+    assert rmse(states[500:], wanted[500:]) < 1e-6
+
+
+@VEHICLES
+def test_yaw_slews_while_hovering(vehicle):
+    states, wanted = fly(vehicle(), stand(START), 5.0, yaw=lambda t: (2.5, 0.0))
+    assert yaw_of(states[-1].quaternion_wxyz) == pytest.approx(2.5, abs=1e-3)
+    assert np.abs([s.body_rate_radps for s in states]).max() <= 2.0 + 1e-9
+    assert np.abs(np.array([s.position_m for s in states]) - wanted).max() < 0.02
+
+
+def test_drag_compensation_takes_the_drag_error_away():
+    def cruise(t):
+        return START + [2.5 * t, 0.0, 0.0], np.array([2.5, 0.0, 0.0]), np.zeros(3)
+
+    drag_kgpm = 0.5 * 1.225 * 40.0 * 4.3e-3
+    error = {}
+    for compensated in (0.0, drag_kgpm):
+        states, wanted = fly(
+            Quadrotor(drag_coefficient=40.0), cruise, 8.0, controller=PositionVelocity(drag_kgpm=compensated)
+        )
+        error[compensated] = float(np.linalg.norm(states[-1].position_m - wanted[-1]))
+    assert error[0.0] == pytest.approx(drag_kgpm * 2.5**2 / 0.75 / (2.0 * 5.0), rel=0.05)  # a / (k_p k_v)
+    assert error[drag_kgpm] < 0.05 * error[0.0]
+
+
+def test_tilt_stays_within_its_limit():
+    controller, vehicle = PositionVelocity(max_tilt_rad=0.3), Quadrotor()
+    controller.reset(vehicle.limits, vehicle.mass_kg)
+    state = State(
+        position_m=START,
+        velocity_mps=np.array([5.0, -5.0, 5.0]),
+        quaternion_wxyz=np.array([1.0, 0.0, 0.0, 0.0]),
+        body_rate_radps=np.zeros(3),
+    )
+    reference = Reference(
+        position_m=np.zeros(3), velocity_mps=np.zeros(3), acceleration_mps2=np.zeros(3), yaw_rad=0.0
+    )
+    command = controller.command(state, reference)
+    tilt = np.arccos(rotation_from_quaternion(command.quaternion_wxyz)[2, 2])
+    assert tilt == pytest.approx(0.3)
+
+
+def test_refuses_a_tilt_limit_that_cannot_lift():
+    with pytest.raises(ConfigError, match=r"max_tilt_rad must be <= 1.2 rad, got 1.5"):
+        PositionVelocity(max_tilt_rad=1.5)
