@@ -34,7 +34,9 @@ def check_yaml(group: str, option: str) -> None:
     for name, value in values.items():
         default = fields[name].default
         assert (tuple(value) if isinstance(value, list) else value) == default, name
-    lines = [line for line in path.read_text().splitlines() if line and not line.startswith(("_target_", "#"))]
+    lines = [
+        line for line in path.read_text().splitlines() if line and not line.startswith(("_target_", "#"))
+    ]
     assert all("#" in line for line in lines)
 
 

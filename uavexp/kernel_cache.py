@@ -68,6 +68,12 @@ class KernelLocator:
         return str(self._line)
 
 
+def has_kernels() -> bool:
+    """Whether any kernel was ever compiled for this copy of the package (else a minute of it lies ahead)."""
+    source = _PACKAGE / "planner" / "any.py"
+    return any(next(folder.glob("*.nbc"), None) is not None for folder in _folders(source))
+
+
 @functools.cache
 def source_stamp(file: Path) -> str:
     """sha256 over a source file and, transitively, the package files it imports."""

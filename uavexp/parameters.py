@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import functools
 import inspect
 import math
 import types
@@ -17,6 +18,7 @@ from uavexp.errors import ConfigError
 MISSING = "???"  # OmegaConf's mark of a value that must be given
 
 
+@functools.cache
 def parameter_types(cls: type) -> dict[str, Any]:
     """Name and annotation of every constructor parameter of a component class."""
     if dataclasses.is_dataclass(cls):
@@ -30,6 +32,7 @@ def parameter_types(cls: type) -> dict[str, Any]:
     }
 
 
+@functools.cache
 def required_parameters(cls: type) -> list[str]:
     """Names of the constructor parameters without a default."""
     parameters = inspect.signature(cls).parameters

@@ -22,7 +22,9 @@ REST = State(
 )
 
 
-def asked(option, *, mass_kg=0.75, acceleration=(0.0, 0.0, 0.0), position=(0.0, 0.0, 0.0), yaw=0.0, state=REST):
+def asked(
+    option, *, mass_kg=0.75, acceleration=(0.0, 0.0, 0.0), position=(0.0, 0.0, 0.0), yaw=0.0, state=REST
+):
     controller = build("controller", option)
     controller.reset(LIMITS, mass_kg)
     reference = Reference(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -55,7 +57,7 @@ def test_believed_velocity_is_the_rate_of_believed_position(option):
             body_rate_radps=moving.body_rate_radps,
         )
         believed.append(estimator.estimate(state, 0.01))
-    for before, after in zip(believed, believed[1:], strict=False):
+    for before, after in pairwise(believed):
         rate = (after.position_m - before.position_m) / 0.01
         np.testing.assert_allclose(rate, before.velocity_mps, atol=1e-9)
 

@@ -15,13 +15,14 @@ from uavexp.vehicle.quadrotor import Quadrotor
 VEHICLES = pytest.mark.parametrize("vehicle", [Quadrotor, PointMass])
 STEP_S = 0.01
 START = np.array([0.0, 0.0, 1.5])
+AHEAD = np.array([1.0, 0.0, 1.5])
 
 
 def figure_eight(t):
     """Lemniscate at up to 2.44 m/s and 2.49 m/s²."""
     a, b, w = 2.4, 1.1, 0.72
     s, c, s2, c2 = np.sin(w * t), np.cos(w * t), np.sin(2 * w * t), np.cos(2 * w * t)
-    position = START + [a * s, b * s2, 0.1 * s]
+    position = START + np.array([a * s, b * s2, 0.1 * s])
     return (
         position,
         w * np.array([a * c, 2 * b * c2, 0.1 * c]),
@@ -117,8 +118,8 @@ def test_step_response_overshoots_little_and_settles(vehicle, step_m):
 
 @VEHICLES
 def test_stays_stable_with_a_latency_of_three_steps(vehicle):
-    states, _ = fly(vehicle(), stand(START + [1.0, 0.0, 0.0]), 10.0, latency_steps=3, start=START)
-    np.testing.assert_allclose(states[-1].position_m, START + [1.0, 0.0, 0.0], atol=1e-3)
+    states, _ = fly(vehicle(), stand(AHEAD), 10.0, latency_steps=3, start=START)
+    np.testing.assert_allclose(states[-1].position_m, AHEAD, atol=1e-3)
 
 
 @VEHICLES
@@ -137,7 +138,7 @@ def test_yaw_slews_while_hovering(vehicle):
 
 def test_drag_compensation_takes_the_drag_error_away():
     def cruise(t):
-        return START + [2.5 * t, 0.0, 0.0], np.array([2.5, 0.0, 0.0]), np.zeros(3)
+        return START + 2.5 * t * (AHEAD - START), np.array([2.5, 0.0, 0.0]), np.zeros(3)
 
     drag_kgpm = 0.5 * 1.225 * 40.0 * 4.3e-3
     error = {}

@@ -52,7 +52,9 @@ def test_spread_is_that_of_the_gauss_markov_walk_whatever_the_step(step_s):
         max_yaw_drift_radps=1.0,
         correlation_time_s=tau,
     )
-    runs = [errors(estimator, seed, round(end_s / step_s), step_s) for seed in range(400 if step_s > 0.1 else 100)]
+    runs = [
+        errors(estimator, seed, round(end_s / step_s), step_s) for seed in range(400 if step_s > 0.1 else 100)
+    ]
     spread = 2.0 * tau * (end_s - tau * (1.0 - math.exp(-end_s / tau)))
     position2 = np.mean([position[-1] ** 2 for position, _ in runs])
     yaw2 = np.mean([yaw[-1] ** 2 for _, yaw in runs])
@@ -85,5 +87,7 @@ def test_no_drift_is_the_truth():
 
 
 def test_refuses_a_bound_below_the_rms():
-    with pytest.raises(ConfigError, match=r"max_position_drift_mps must be >= the rms drift of 0.1, got 0.05"):
+    with pytest.raises(
+        ConfigError, match=r"max_position_drift_mps must be >= the rms drift of 0.1, got 0.05"
+    ):
         Drift(position_drift_mps=0.1)

@@ -99,7 +99,9 @@ def test_points_lie_on_the_geometry_from_any_pose_and_mount():
 def test_a_positive_mount_pitch_looks_up():
     forward = scan_of(FLOOR, pose((0, 0, 1)), mount_pitch_deg=30.0, **QUIET).camera_rotation[:, 2]
     np.testing.assert_allclose(forward, [np.cos(np.radians(30)), 0.0, 0.5], atol=1e-12)
-    offset = scan_of(FLOOR, pose((0, 0, 1), quaternion_from_yaw(np.pi / 2)), mount_offset_m=(0.2, 0, 0), **QUIET)
+    offset = scan_of(
+        FLOOR, pose((0, 0, 1), quaternion_from_yaw(np.pi / 2)), mount_offset_m=(0.2, 0, 0), **QUIET
+    )
     np.testing.assert_allclose(offset.camera_position_m, [0.0, 0.2, 1.0], atol=1e-12)
 
 
@@ -137,7 +139,9 @@ def test_returns_are_missing_at_depth_edges_and_nowhere_else():
 
 
 def test_a_floor_is_no_edge_however_steep():
-    depth = scan_of(FLOOR, pose((0, 0, 0.3)), **(QUIET | {"edge_missing": True, "edge_missing_probability": 1.0})).depth_m
+    depth = scan_of(
+        FLOOR, pose((0, 0, 0.3)), **(QUIET | {"edge_missing": True, "edge_missing_probability": 1.0})
+    ).depth_m
     assert not np.isnan(depth).any()
 
 
@@ -158,6 +162,7 @@ def test_beyond_range_is_inf_and_too_near_is_nan():
     assert np.isposinf(scan_of(wall(5.5)).depth_m).all()
     assert np.isposinf(scan_of(wall(-9.0)).depth_m).all()  # nothing in view
     assert np.isnan(scan_of(wall(0.15)).depth_m).all()
+    assert np.isnan(scan_of(wall(0.0), min_range_m=0.0, **QUIET).depth_m).all()  # camera on the surface
 
 
 def test_same_seed_same_image_and_switches_do_not_shift_the_stream():

@@ -14,6 +14,7 @@ from uavexp.cli.outputs import folder_name, laps, output_folder, reason_of, writ
 from uavexp.cli.rows import failed_row, flown_row
 from uavexp.cli.terminal import Terminal
 from uavexp.errors import ConfigError, RecordError, UavexpError
+from uavexp.kernel_cache import has_kernels
 from uavexp.records import code_digest, lock_digest
 from uavexp.table import TABLE, write_table
 
@@ -74,6 +75,7 @@ def execute(command: Command, terminal: Terminal, user_folder: Path | None = Non
     if len(jobs) > 1:
         _check_worlds(command)
     run = {"code": code_digest(), "lock": lock_digest()}
+    terminal.begin(len(jobs), cold=not has_kernels())
     results: list[Result] = []
     with output_folder(command.out, _prefix(command)) as root, terminal.progress(len(jobs)):
         try:
@@ -93,17 +95,17 @@ def _fly_job(job: Job, root: Path, run: dict[str, Any], terminal: Terminal, othe
     folder = root / job.folder
     try:
         trial = fly_cell(job.cell, job.seed, terminal.flying(job))
+        wall_s = time.perf_counter() - begin_s
+        _make_folder(folder)
+        write_trial(trial, folder, run, _wall(job, wall_s))
     except Exception as error:
-        if isinstance(error, UavexpError) and not others_flown:
-            raise  # bad input, and nothing is written yet
+        if isinstance(error, RecordError) or (isinstance(error, UavexpError) and not others_flown):
+            raise  # a full disk; or bad input, and nothing is written yet
         wall_s = time.perf_counter() - begin_s
         _make_folder(folder)
         write_failure(job.cell, job.seed, folder, run, _wall(job, wall_s), error)
         row = failed_row(job.cell, job.seed, wall_s, job.folder)
         return Result(job=job, row=row, trial=None, reason=reason_of(error))
-    wall_s = time.perf_counter() - begin_s
-    _make_folder(folder)
-    write_trial(trial, folder, run, _wall(job, wall_s))
     row = flown_row(trial, laps(trial), wall_s, job.folder)
     return Result(job=job, row=row, trial=trial, reason=trial.log.reason)
 

@@ -33,7 +33,8 @@ def _attitude(force: Float, yaw_rad: float) -> Float:
     x = np.cross(y, z)
     rotation = np.empty((3, 3))
     rotation[:, 0], rotation[:, 1], rotation[:, 2] = x, y, z
-    return quaternion_from_rotation(rotation)
+    attitude: Float = quaternion_from_rotation(rotation)
+    return attitude
 
 
 @nb.njit(cache=True)

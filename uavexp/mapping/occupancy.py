@@ -10,9 +10,10 @@ D <- (w D + d) / (w + 1) with capped w (Curless and Levoy 1996), and judged:
 - Below `occupied_below_m` it is a hit, above `free_above_m` a miss; in between a miss for a
   voxel that is not occupied, and neither for one that is. Hits and misses move a small clamped
   counter (as the clamped log-odds of Hornung et al. 2013); a voxel becomes occupied when the
-  counter reaches `occupied_evidence` and ceases to be when it is back at zero. One hit is not enough, so a speckle makes no obstacle; a voxel hit
-  once is not called free either, so no first sight of a surface is lost. A hit counts more
-  than a miss: an object narrower than a pixel, hit in a third of the frames, stands.
+  counter reaches `occupied_evidence` and ceases to be when it is back at zero. One hit is not
+  enough, so a speckle makes no obstacle; a voxel hit once is not called free either, so no
+  first sight of a surface is lost. A hit counts more than a miss: an object narrower than a
+  pixel, hit in more than a third of the frames, stands.
 - The two limits lie 3/4 of a voxel apart and their sum exceeds a voxel. So a board thinner
   than a voxel, even a sheet, keeps an occupied voxel from either side: if its nearest voxel
   lies s behind the front, then s in front of the back, and min(s, voxel - s) is below half a
@@ -42,7 +43,7 @@ _UNKNOWN, _FREE, _OCCUPIED = 0, 1, 2  # of `mapping.base`; literals so that kern
 # bits of a live voxel's byte: 0-1 state, 2 on the list of changes, 3-7 evidence
 _STATE, _LISTED, _EVIDENCE = 3, 4, 3
 LARGEST_EVIDENCE = 31
-_BYTES_PER_VOXEL = 56  # TSDF and state 7, ESDF 25, lists at their longest 24
+_BYTES_PER_VOXEL = 50  # TSDF and state 7, ESDF 19, lists at their longest 16, Open3D's blocks 8
 
 
 class Rule(NamedTuple):

@@ -77,7 +77,7 @@ class MinAcc:
         )
         require(
             self.safe_clearance_m > self.min_clearance_m,
-            f"safe_clearance_m must be > min_clearance_m ({self.min_clearance_m}), got {self.safe_clearance_m}",
+            f"safe_clearance_m must be > min_clearance_m {self.min_clearance_m}, got {self.safe_clearance_m}",
         )
         require(
             1.0 <= self.duration_margin <= 10.0,

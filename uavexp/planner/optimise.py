@@ -271,10 +271,9 @@ class _Shaper:
         unavoidable = fast + rising**2 * curve.h / (2.0 * (rising + settings.max_acceleration))
         top = max(settings.max_speed, unavoidable) * (1.0 + 1e-9)
         most = max(settings.max_acceleration, strong) * (1.0 + 1e-9)
-        return max(
-            float(peak_speed(curve.control, curve.h)) / top,
-            math.sqrt(peak_acceleration(curve.control, curve.h) / most),
-        )
+        too_strong: float = peak_acceleration(curve.control, curve.h) / most
+        too_fast: float = peak_speed(curve.control, curve.h) / top
+        return max(too_fast, math.sqrt(too_strong))
 
 
 def _start_on_path(problem: Problem, settings: Settings) -> tuple[float, float]:

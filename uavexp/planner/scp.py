@@ -234,7 +234,7 @@ def limit_rows(control: Float, h: float, limits: Float, bounds: Float) -> tuple[
             if not hard and norm < _NEAR_LIMIT * limit:
                 continue
             frame = _frame(vector)
-            for turn in range(10 if hard else 1 + 4 * order):
+            for turn in range(10 if hard else 1 + 2 * order):
                 sides[size] = limit
                 for axis in range(3):
                     normal[axis] = (

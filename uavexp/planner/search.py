@@ -26,8 +26,7 @@ from uavexp.mapping.base import DistanceField
 from uavexp.planner.heap import pop, sift_up
 from uavexp.types import Float, Float32, Int, Int32, PlanStatus, UInt8
 
-# place of a cell in the heap, or one of these
-# -1 closed, -2 blocked, -3 touched but not open
+_CLOSED, _BLOCKED, _SEEN = -1, -2, -3  # what `place` says of a cell that is not in the heap
 _TIE = 1.0 + 1e-6  # inflation of the heuristic: prefers the deeper of equal nodes
 _BELOW_LIMIT = 20.0  # extra penalty of a cell below the limit, next to a start that is there too
 _STEPS = np.array(
@@ -61,13 +60,13 @@ def _penalty(clearance: float, rule: Float) -> float:
         return 0.0
     short = min((rule[1] - clearance) * rule[2], 10.0)  # an unknown start has no clearance at all
     penalty = rule[3] * short * short
-    return penalty + _BELOW_LIMIT if clearance < rule[0] else penalty
+    return float(penalty + _BELOW_LIMIT if clearance < rule[0] else penalty)
 
 
 @nb.njit(cache=True, inline="always")
 def _limit(rule: Float, distance_voxels_squared: float) -> float:
     """Least clearance of a passable cell at this squared distance from the start."""
-    return min(rule[0], rule[4]) if distance_voxels_squared <= rule[5] else rule[0]
+    return float(min(rule[0], rule[4]) if distance_voxels_squared <= rule[5] else rule[0])
 
 
 @nb.njit(cache=True)
@@ -86,7 +85,7 @@ def _clearance(
             nj = min(max(j + (side if axis == 1 else 0), 0), state.shape[1] - 1)
             nk = min(max(k + (side if axis == 2 else 0), 0), state.shape[2] - 1)
             if state[ni, nj, nk] == 0:
-                return min(here, rule[0])
+                return float(min(here, rule[0]))
     return here
 
 
@@ -144,13 +143,13 @@ def _plan_columns(
                     stamp[other] = generation
                     clearance[other] = best
                     cost[other] = np.inf
-                    place[other] = -2 if best < _limit(rule, apart) and other != target else -3
-                if place[other] == -1 or place[other] == -2:  # closed or blocked
+                    place[other] = _BLOCKED if best < _limit(rule, apart) and other != target else _SEEN
+                if place[other] == _CLOSED or place[other] == _BLOCKED:
                     continue
                 step = 1.4142135623730951 if di != 0 and dj != 0 else 1.0
                 there = cost[cell] + step * (1.0 + 0.5 * (here + _penalty(clearance[other], rule)))
                 if there < cost[other]:
-                    if place[other] == -3:
+                    if place[other] == _SEEN:
                         heap[size] = other
                         place[other] = size
                         size += 1
@@ -216,8 +215,8 @@ def _plan_cells(
                 apart = float((i - start[0]) ** 2 + (j - start[1]) ** 2 + (k - start[2]) ** 2)
                 stamp[other] = generation
                 cost[other] = np.inf
-                place[other] = -2 if clearance < _limit(rule, apart) and other != target else -3
-            if place[other] == -1 or place[other] == -2:  # closed or blocked
+                place[other] = _BLOCKED if clearance < _limit(rule, apart) and other != target else _SEEN
+            if place[other] == _CLOSED or place[other] == _BLOCKED:
                 continue
             if not cut_corners and _cuts_corner(distance, state, known_only, rule, ci, cj, ck, n):
                 continue
@@ -225,11 +224,11 @@ def _plan_cells(
             if there < cost[other]:
                 column = (i - i0) * nj + j - j0
                 bound = _octile_3d(i - goal[0], j - goal[1], k - goal[2])
-                if planar_stamp[column] == generation and planar_place[column] == -1:
+                if planar_stamp[column] == generation and planar_place[column] == _CLOSED:
                     bound = max(bound, planar_cost[column])
                 else:
                     bound = max(bound, planar_total - _octile_2d(i - start[0], j - start[1]))
-                if place[other] == -3:
+                if place[other] == _SEEN:
                     heap[size] = other
                     place[other] = size
                     size += 1

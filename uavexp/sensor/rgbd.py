@@ -11,7 +11,8 @@ From the true depth z along the optical axis to the measured one, in this order:
 4. missing returns at depth edges: a pixel at which inverse depth (linear over the image of
    any plane) has a second difference of more than `edge_ratio` of its largest value among
    the neighbours has none, with probability `edge_missing_probability`, on both sides;
-5. range: beyond `max_range_m`, or no surface at all, is +inf; below `min_range_m` is NaN.
+5. range: below `min_range_m` (before quantisation) is NaN; beyond `max_range_m`, or no surface at
+   all, is +inf.
 
 A missing return is NaN. Every term has its switch. One normal and one uniform number is
 drawn per pixel and frame whatever the image and the switches, so that streams stay aligned.
@@ -63,12 +64,12 @@ def _measure(
     inverse = np.empty((height, width), dtype=np.float32)
     for v in range(height):
         for u in range(width):
-            inverse[v, u] = 1.0 / min(true_depth_m[v, u], max_range_m)
+            inverse[v, u] = 1.0 / max(true_depth_m[v, u], 1e-6)
     measured = np.empty((height, width), dtype=np.float32)
     for v in range(height):
         for u in range(width):
             true = true_depth_m[v, u]
-            if uniform[v, u] < edge_probability and _at_edge(inverse, v, u, edge_ratio):
+            if uniform[v, u] < edge_probability and _at_edge(inverse, v, u, edge_ratio, 1.0 / max_range_m):
                 measured[v, u] = np.nan
                 continue
             if not true < np.inf:
@@ -78,12 +79,13 @@ def _measure(
                 measured[v, u] = np.nan
                 continue
             depth = true + axial_scale * (0.0012 + 0.0019 * (true - 0.4) ** 2) * gaussian[v, u]
-            if depth >= min_range_m and disparity_unit_m > 0.0:
+            if depth < min_range_m or depth <= 0.0:
+                measured[v, u] = np.nan
+                continue
+            if disparity_unit_m > 0.0:
                 steps = np.floor(disparity_unit_m / depth + 0.5)
                 depth = disparity_unit_m / steps if steps > 0.0 else np.inf
-            if depth < min_range_m:
-                depth = np.nan
-            elif depth > max_range_m:
+            if depth > max_range_m:
                 depth = np.inf
             measured[v, u] = depth
     return measured
@@ -98,19 +100,22 @@ def _is_grazed(normal: Float32, rays: Float32, n: int, least_cosine: float) -> b
 
 
 @nb.njit(cache=True)
-def _at_edge(inverse: Float32, v: int, u: int, ratio: float) -> bool:
+def _at_edge(inverse: Float32, v: int, u: int, ratio: float, least: float) -> bool:
     """Whether inverse depth jumps at a pixel: its second difference along a row or column.
 
     Inverse depth is linear over the image of a plane, however steep: a floor is no edge.
+    Nor is anything where all is farther than 1 / `least`.
     """
     here = inverse[v, u]
     if 0 < u < inverse.shape[1] - 1:
         left, right = inverse[v, u - 1], inverse[v, u + 1]
-        if abs(left - 2.0 * here + right) > ratio * max(left, here, right):
+        largest = max(left, here, right)
+        if largest >= least and abs(left - 2.0 * here + right) > ratio * largest:
             return True
     if 0 < v < inverse.shape[0] - 1:
         above, below = inverse[v - 1, u], inverse[v + 1, u]
-        if abs(above - 2.0 * here + below) > ratio * max(above, here, below):
+        largest = max(above, here, below)
+        if largest >= least and abs(above - 2.0 * here + below) > ratio * largest:
             return True
     return False
 

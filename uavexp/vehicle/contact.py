@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 import numba as nb
 import numpy as np
 
-from uavexp.geometry import quaternion_from_rotation, rotation_from_quaternion
+from uavexp.geometry import rotation_from_quaternion
 from uavexp.types import Contact, Float, State
 
 if TYPE_CHECKING:
@@ -61,7 +61,9 @@ def _slide(displacement: Float, velocity: Float, normal: Float, least: Float) ->
     for _ in range(40):
         for i in range(normal.shape[0]):
             short = least[i] - (
-                normal[i, 0] * displacement[0] + normal[i, 1] * displacement[1] + normal[i, 2] * displacement[2]
+                normal[i, 0] * displacement[0]
+                + normal[i, 1] * displacement[1]
+                + normal[i, 2] * displacement[2]
             )
             if short > 0.0:
                 for axis in range(3):
