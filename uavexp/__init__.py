@@ -11,7 +11,7 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, Any
 
-from uavexp.kernel_cache import LOCATORS, VARIABLE
+from uavexp.kernel_cache import LOCATOR, VARIABLE
 
 if TYPE_CHECKING:
     from uavexp.cli.flight import Trial
@@ -30,7 +30,7 @@ _THREAD_VARIABLES = (
 )
 # overridden, not defaulted: a user's OMP_NUM_THREADS=2 would change results
 os.environ.update(dict.fromkeys(_THREAD_VARIABLES, "1"))
-os.environ[VARIABLE] = ",".join(LOCATORS)
+os.environ[VARIABLE] = LOCATOR
 
 
 def fly(*overrides: str, **values: Any) -> Trial:

@@ -18,15 +18,7 @@ from pathlib import Path
 from typing import Any
 
 VARIABLE = "NUMBA_CACHE_LOCATOR_CLASSES"
-# ours first; numba's own for everybody else's kernels
-LOCATORS = (
-    "uavexp.kernel_cache.KernelLocator",
-    "UserProvidedCacheLocator",
-    "InTreeCacheLocator",
-    "UserWideCacheLocator",
-    "IPythonCacheLocator",
-    "ZipCacheLocator",
-)
+LOCATOR = "uavexp.kernel_cache.KernelLocator"
 _PACKAGE = Path(__file__).resolve().parent
 _IMPORT = re.compile(
     r"^\s*(?:from\s+(?P<module>uavexp[\w.]*)\s+import\s+(?P<names>\([^)]*\)|[^\n#]*)|import\s+(?P<plain>uavexp[\w.]*))",
@@ -43,13 +35,17 @@ class KernelLocator:
         self._folder = folder
 
     @classmethod
-    def from_function(cls, py_func: Callable[..., Any], py_file: str) -> KernelLocator | None:
-        """Locator of a kernel of this package; None leaves the kernel to numba's own locators."""
+    def from_function(cls, py_func: Callable[..., Any], py_file: str) -> Any:
+        """Locator of a kernel of this package; everybody else's is left to numba's own locators."""
         file = Path(py_file).resolve()
-        if not file.is_relative_to(_PACKAGE) or not file.is_file():
-            return None
-        folder = next((path for path in _folders(file) if _usable(path)), None)
-        return None if folder is None else cls(py_func.__code__.co_firstlineno, file, folder)
+        if file.is_relative_to(_PACKAGE) and file.is_file():
+            folder = next((path for path in _folders(file) if _usable(path)), None)
+            if folder is not None:
+                return cls(py_func.__code__.co_firstlineno, file, folder)
+        from numba.core.caching import CacheImpl
+
+        found = (other.from_function(py_func, py_file) for other in CacheImpl._locator_classes)
+        return next((locator for locator in found if locator is not None), None)
 
     def ensure_cache_path(self) -> None:
         """Create the folder."""

@@ -177,12 +177,12 @@ class Pilot:
         return result
 
     def _plan_request(self, observation: Observation, goal: Goal) -> PlanRequest:
-        """From the reference at t + latency; from the measured state when that has been left behind."""
+        """From the reference at t + latency; from the measured state when that is far off or inside an obstacle."""
         start_s = observation.time_s + self.latency_s
         state = observation.state
         position_m, velocity_mps, acceleration_mps2 = self._planned_state(start_s)
         error_m = float(np.linalg.norm(observation.reference.position_m - state.position_m))
-        if error_m >= self.restart_error_m:
+        if error_m >= self.restart_error_m or observation.field.distance_m(position_m[None])[0] <= 0.0:
             position_m = state.position_m + self.latency_s * state.velocity_mps
             velocity_mps, acceleration_mps2 = state.velocity_mps, np.zeros(3)
         return PlanRequest(

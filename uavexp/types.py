@@ -274,7 +274,7 @@ class Difficulty:
     """How hard a world is, measured on the true geometry."""
 
     clutter_density: float  # occupied share of the flight volume at the flight height band
-    narrowest_gap_m: float  # 2 x smallest clearance along the shortest path
+    narrowest_gap_m: float  # least free horizontal width across the shortest path
     straight_line_m: float
     shortest_path_m: float  # true shortest collision-free path at the required clearance
 

@@ -75,9 +75,11 @@ def execute(command: Command, terminal: Terminal, user_folder: Path | None = Non
     if len(jobs) > 1:
         _check_worlds(command)
     run = {"code": code_digest(), "lock": lock_digest()}
-    terminal.begin(len(jobs), cold=not has_kernels())
     results: list[Result] = []
-    with output_folder(command.out, _prefix(command)) as root, terminal.progress(len(jobs)):
+    with (
+        output_folder(command.out, _prefix(command)) as root,
+        terminal.progress(len(jobs), cold=not has_kernels()),
+    ):
         try:
             for result in run_all(jobs, lambda job: _fly_job(job, root, run, terminal, bool(results))):
                 results.append(result)

@@ -35,15 +35,12 @@ class Terminal:
         self._total = self._done = self._successes = 0
         self._last_s = 0.0
 
-    def begin(self, total: int, *, cold: bool) -> None:
-        """Say what is about to fly, and why the first flight takes longer."""
+    @contextmanager
+    def progress(self, total: int, *, cold: bool = False) -> Iterator[None]:
+        """Show progress over `total` trials while the block runs; `cold`: no kernel is compiled yet."""
+        self._total = total
         what = "1 trial" if total == 1 else f"{total} trials"
         self._say(f"flying {what}" + (" (first run: compiling kernels takes about a minute)" if cold else ""))
-
-    @contextmanager
-    def progress(self, total: int) -> Iterator[None]:
-        """Show progress over `total` trials while the block runs."""
-        self._total, self._last_s = total, time.monotonic()
         if not self._console.is_terminal:
             yield
             return

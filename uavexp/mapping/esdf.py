@@ -177,15 +177,19 @@ def _stage_y(
     runs = np.empty((ny, 2), np.int32)
     wanted = (fell_in[:count_in] <= cap).astype(np.uint8)
     rows = np.arange(ny).astype(np.int32)
+    widest = int(math.sqrt(cap))
     first = 0
-    while first < count_in:
+    while first < count_in:  # groups in one plane whose reaches do not meet
         x = columns_in[first] // ny
         last = first
-        while last < count_in and columns_in[last] // ny == x:
-            last += 1
         plane = x * ny
+        while (
+            last < count_in
+            and columns_in[last] < plane + ny
+            and (last == first or columns_in[last] - columns_in[last - 1] <= 2 * widest)
+        ):
+            last += 1
         first_y, last_y = columns_in[first] - plane, columns_in[last - 1] - plane
-        widest = int(math.sqrt(cap))
         bound = _largest(peak[plane + max(first_y - widest, 0) : plane + min(last_y + widest + 1, ny)])
         reach = int(math.sqrt(bound))
         low, high = max(first_y - reach, 0), min(last_y + reach + 1, ny)
@@ -292,11 +296,11 @@ def _stage_x(
 
 
 @nb.njit(cache=True)
-def _count_changed(
+def _list_changed(
     shape: tuple[int, int, int], touched: Int32, outside: Int16, inside: Int16, published: Int16,
-    seen: UInt8, columns: Int32,
+    seen: UInt8, begins: Int32, ends: Int32,
 ) -> tuple[int, int]:  # fmt: skip
-    """List, in ascending order, the touched columns that hold a change; count columns and voxels."""
+    """List, ascending, the part of each touched column that holds its changes; count parts and changes."""
     nx, ny, nz = shape
     count, total = 0, 0
     for x in range(nx):
@@ -304,14 +308,17 @@ def _count_changed(
             begin = (x * ny + y) * nz
             far, near = outside[begin : begin + nz], inside[begin : begin + nz]
             was, fresh = published[begin : begin + nz], seen[begin : begin + nz]
-            changed = np.int16(0)
+            changes, low, high = np.int16(0), np.int16(nz), np.int16(0)
             for k in range(nz):
                 differs = (np.int16(far[k] - near[k]) != was[k]) | (fresh[k] != 0)
-                changed = np.int16(changed + differs)
-            if changed > 0:
-                columns[count] = x * ny + y
+                changes = np.int16(changes + differs)
+                low = min(low, np.int16(k) if differs else np.int16(nz))
+                high = max(high, np.int16(k + 1) if differs else np.int16(0))
+            if changes > 0:
+                begins[count] = begin + low
+                ends[count] = begin + high
                 count += 1
-                total += int(changed)
+                total += int(changes)
         touched[x, 0] = ny
         touched[x, 1] = 0
     return count, total
@@ -319,20 +326,18 @@ def _count_changed(
 
 @nb.njit(cache=True)
 def _emit(
-    columns: Int32, outside: Int16, inside: Int16, published: Int16, seen: UInt8, table: Float32, cap: int,
-    max_distance_m: float, distance: Float32,
+    begins: Int32, ends: Int32, outside: Int16, inside: Int16, published: Int16, seen: UInt8,
+    table: Float32, cap: int, max_distance_m: float, distance: Float32,
     voxel: Int32, old: Float32, new: Float32, first_seen: UInt8, occupied: UInt8,
 ) -> None:  # fmt: skip
-    """Publish the new distances of the listed columns and write the change log (with one spare row)."""
-    nz = distance.shape[2]
+    """Publish the distances of the listed parts and write the change log (with one spare row)."""
     beyond = np.float32(max_distance_m)
     count = np.uint64(0)  # unsigned: numba then leaves out the test for negative indices
-    flat = distance.reshape(-1)
-    for n in range(columns.shape[0]):
-        begin = columns[n] * nz
-        far, near = outside[begin : begin + nz], inside[begin : begin + nz]
-        was, fresh, metres = published[begin : begin + nz], seen[begin : begin + nz], flat[begin : begin + nz]
-        for k in range(nz):  # every row is written, and kept when the voxel changed: no branches
+    for n in range(begins.shape[0]):
+        begin, end = begins[n], ends[n]
+        far, near = outside[begin:end], inside[begin:end]
+        was, fresh, metres = published[begin:end], seen[begin:end], distance[begin:end]
+        for k in range(end - begin):  # every row is written, and kept when it changed: no branches
             value = np.int16(far[k] - near[k])
             after = table[np.uint64(value + cap)]
             voxel[count] = begin + k
@@ -342,7 +347,7 @@ def _emit(
             occupied[count] = near[k] > 0
             count += np.uint64((value != was[k]) | (fresh[k] != 0))
             metres[k] = after
-        for k in range(nz):
+        for k in range(end - begin):
             was[k] = np.int16(far[k] - near[k])
         fresh[:] = 0
 
@@ -471,16 +476,16 @@ class SignedDistance:
             flags[box[0] : box[1], box[2] : box[3]] = 0
         if first_seen.size:
             _mark_seen(self.shape, first_seen, self._seen, self._touched)
-        columns = self._changed[0][0]
-        count, total = _count_changed(
+        begins, ends = self._changed[0][0], self._changed[1][0]  # free again by now
+        parts, total = _list_changed(
             self.shape, self._touched, self._outside.along_x, self._inside.along_x, self._published,
-            self._seen, columns,
+            self._seen, begins, ends,
         )  # fmt: skip
         kinds = (np.int32, np.float32, np.float32, np.uint8, np.uint8)
         log: tuple[Any, ...] = tuple(np.empty(total + 1, kind) for kind in kinds)
         _emit(
-            columns[:count], self._outside.along_x, self._inside.along_x, self._published, self._seen,
-            self._table, self.cap, self.max_distance_m, self.distance, *log,
+            begins[:parts], ends[:parts], self._outside.along_x, self._inside.along_x, self._published,
+            self._seen, self._table, self.cap, self.max_distance_m, self.distance.reshape(-1), *log,
         )  # fmt: skip
         voxel, old, new, fresh, occupied = (array[:total] for array in log)
         return MapUpdate(

@@ -128,7 +128,7 @@ def _draw_legend(sheet: page.Page, world: World, log: TrialLog) -> None:
     low_m, high_m = plan_view.band_m(world)
     handles = [
         Line2D([], [], color=plan_view.SPEED_COLOURS(0.7), lw=2.2, label="flown"),
-        Line2D([], [], color=style.BLACK, lw=0.9, ls="--", label="true shortest path"),
+        Line2D([], [], color=style.BLACK, lw=0.9, ls="--", label="true shortest path (3D)"),
         Line2D([], [], color=style.SKY, lw=1.0, label="plans"),
         Patch(color=style.SURFACE, label=f"true, z {low_m:.1f} to {high_m:.1f} m"),
         Patch(color=style.SOLID, label="solid or shut off there"),

@@ -19,8 +19,8 @@ BLUE = "#0072B2"
 VERMILLION = "#D55E00"
 PURPLE = "#CC79A7"
 
-SURFACE = "#8C8C8C"  # true obstacles' surfaces
-SOLID = "#E4E4E4"  # inside them, or shut off from the flight
+SURFACE = "#B4B4B4"  # true obstacles' surfaces
+SOLID = "#E8E8E8"  # inside them, or shut off from the flight
 MAPPED = "#2A2A2A"  # occupied voxels of the vehicle's map
 FAINT = "#C8C8C8"  # grid lines, frames
 
