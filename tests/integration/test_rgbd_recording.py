@@ -95,7 +95,7 @@ def test_surface_lies_where_held_out_frames_measure_it(maps, scans, name):
     gap = np.concatenate([from_surface[voxels(backend, measured_points(scan))] for scan in scans[1]])
     assert gap.size > 50_000
     assert np.median(gap) <= 1.0
-    assert (gap <= 2.0).mean() > 0.93  # the reference mesh, at 2 cm, hits within 5 cm in 95 %
+    assert (gap <= 1.0).mean() > 0.98  # the reference mesh, at 2 cm, hits within 5 cm in 95 %
 
 
 @pytest.mark.parametrize("name", [path.stem for path in OPTIONS])
@@ -109,7 +109,7 @@ def test_rays_of_held_out_frames_run_through_free_space(maps, scans, name):
             states.append(backend.field.state[voxels(backend, along)])
     state = np.concatenate(states)
     assert (state == OCCUPIED).mean() < 0.01
-    assert (state == FREE).mean() > 0.95
+    assert (state == FREE).mean() > 0.98
 
 
 def test_backends_agree_on_the_recording(maps):

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from tests.logs import make_world
+from uavexp.controller.position_velocity import PositionVelocity
 from uavexp.geometry import multiply_quaternions, quaternion_from_yaw, rotation_from_quaternion
 from uavexp.scene import Scene
-from uavexp.types import State
+from uavexp.types import Reference, State
 from uavexp.vehicle.contact import ContactTracker, resolve
+from uavexp.vehicle.quadrotor import Quadrotor
 
 SIZE_M = (0.32, 0.32, 0.12)
 STEP_S = 0.01
@@ -239,3 +241,27 @@ def test_far_from_everything_a_step_asks_the_scene_nothing():
         assert not tracker.advance(before, drifted(before), k * STEP_S)[1]
     assert scene.asked == 1
     assert tracker.contacts == ()
+
+
+def test_a_quadrotor_sent_into_a_wall_slides_along_it_and_leaves_when_told():
+    vehicle, controller = Quadrotor(), PositionVelocity()
+    state = body((1.0, 0.0, 1.0), (0.0, 0.0, 0.0))
+    vehicle.reset(state)
+    controller.reset(vehicle.limits, vehicle.mass_kg)
+    tracker, farthest_m = ContactTracker(scene=WALL, body_size_m=SIZE_M), 0.0
+    for k in range(1200):
+        goal = np.array([2.5, 1.0, 1.0]) if k < 600 else np.array([1.0, 1.0, 1.0])
+        reference = Reference(
+            position_m=goal, velocity_mps=np.zeros(3), acceleration_mps2=np.zeros(3), yaw_rad=0.4
+        )
+        after = vehicle.step(controller.command(state, reference), STEP_S)
+        state, touched = tracker.advance(state, after, k * STEP_S)
+        if touched:
+            vehicle.place(state)
+        assert not overlaps(state, WALL)
+        farthest_m = max(farthest_m, state.position_m[0])
+        if k == 599:
+            assert state.position_m[1] == pytest.approx(1.0, abs=0.02)
+    assert farthest_m < 2.0 - 0.16
+    np.testing.assert_allclose(state.position_m, goal, atol=1e-3)
+    assert len(tracker.contacts) == 1

@@ -171,3 +171,16 @@ def test_tilt_stays_within_its_limit():
 def test_refuses_a_tilt_limit_that_cannot_lift():
     with pytest.raises(ConfigError, match=r"max_tilt_rad must be <= 1.2 rad, got 1.5"):
         PositionVelocity(max_tilt_rad=1.5)
+
+
+def test_thrust_is_the_wanted_force_along_the_body_as_it_stands():
+    controller, vehicle = PositionVelocity(), Quadrotor()
+    controller.reset(vehicle.limits, vehicle.mass_kg)
+    tilted = State(
+        position_m=START,
+        velocity_mps=np.zeros(3),
+        quaternion_wxyz=np.array([np.cos(0.2), np.sin(0.2), 0.0, 0.0]),
+        body_rate_radps=np.zeros(3),
+    )
+    rest = Reference(position_m=START, velocity_mps=np.zeros(3), acceleration_mps2=np.zeros(3), yaw_rad=0.0)
+    assert controller.command(tilted, rest).thrust_N == pytest.approx(0.75 * 9.81 * np.cos(0.4))

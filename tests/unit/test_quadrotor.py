@@ -154,7 +154,20 @@ def test_yaw_slews_to_the_command_and_stays_within_the_rate_limit():
     assert 1.8 < max(rate) < 2.0
 
 
-def test_turns_the_shorter_way_and_rights_itself_from_upside_down():
+def test_both_signs_of_a_quaternion_are_one_attitude():
+    ends = []
+    for sign in (1.0, -1.0):
+        vehicle = Quadrotor()
+        vehicle.reset(rest())
+        q = sign * quaternion_from_yaw(1.0)
+        for _ in range(50):
+            state = vehicle.step(Command(thrust_N=7.0, quaternion_wxyz=q, body_rate_radps=np.zeros(3)), 0.01)
+        ends.append(yaw_of(state.quaternion_wxyz))
+    assert 0.2 < ends[0] < 1.0
+    assert ends[0] == ends[1]
+
+
+def test_rights_itself_from_upside_down():
     vehicle = Quadrotor()
     flipped = State(
         position_m=np.array([0.0, 0.0, 50.0]),
@@ -163,7 +176,7 @@ def test_turns_the_shorter_way_and_rights_itself_from_upside_down():
         body_rate_radps=np.zeros(3),
     )
     vehicle.reset(flipped)
-    for sign in (1.0, -1.0):  # both signs of a quaternion are one attitude
+    for sign in (1.0, -1.0):
         vehicle.place(flipped)
         level = Command(
             thrust_N=7.0, quaternion_wxyz=sign * rest().quaternion_wxyz, body_rate_radps=np.zeros(3)

@@ -15,7 +15,7 @@ python -m uavexp [GROUP=OPTION ...] [GROUP.PARAMETER=VALUE ...] [seed=SEEDS] [ou
 
   python -m uavexp strategy=mcr seed=0              one trial: progress, summary, picture
   python -m uavexp strategy=mcr seed=0:20           twenty trials (the stop is excluded)
-  python -m uavexp -m strategy=mcr,tbr trigger.min_interval_s=0,1    see below: a grid
+  python -m uavexp -m strategy=mcr,tbr,ssp seed=0:20                 a grid
   python -m uavexp -m strategy=mcr trigger.delta_map_m=0.05,0.10,0.15 seed=0:20
   python -m uavexp world=file world.path=office.ply your own building
   python -m uavexp --help world                     the parameters of one group

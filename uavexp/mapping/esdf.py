@@ -26,354 +26,22 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-import numba as nb
 import numpy as np
-import numpy.typing as npt
 
 from uavexp.errors import require
+from uavexp.mapping.esdf_kernels import (
+    Int16,
+    carry_x,
+    carry_y,
+    carry_z,
+    emit,
+    flag_columns,
+    list_changed,
+    mark_seen,
+)
 from uavexp.types import Bool, Float32, Int32, MapUpdate, UInt8
 
-Int16 = npt.NDArray[np.int16]
-_OCCUPIED = 2  # `uavexp.mapping.base.OCCUPIED`; a literal so that the kernels compile it in
 _LARGEST_CAP = 16_000  # sums of two capped squares must fit 16 bits
-_MERGE_GAP = 3  # columns: runs closer than this are treated as one
-
-
-@nb.njit(cache=True)
-def _lower(target: Int16, source: Int16, add: int) -> None:
-    """Set target = min(target, source + add) along a contiguous run."""
-    offset = np.int16(add)
-    for k in range(target.shape[0]):
-        target[k] = min(np.int16(source[k] + offset), target[k])
-
-
-@nb.njit(cache=True)
-def _any_equal_raised(target: Int16, old: Int16, new: Int16, add: int) -> bool:
-    """Whether some raised entry may have been the minimum of `target`."""
-    offset = np.int16(add)
-    hit = np.int16(0)
-    for k in range(target.shape[0]):
-        hit = np.int16(hit | ((new[k] > old[k]) & (target[k] == np.int16(old[k] + offset))))
-    return bool(hit)
-
-
-@nb.njit(cache=True)
-def _largest(run: Int16) -> int:
-    largest = np.int16(0)
-    for k in range(run.shape[0]):
-        largest = max(largest, run[k])
-    return int(largest)
-
-
-@nb.njit(cache=True)
-def _compare(new: Int16, old: Int16, cap: int) -> tuple[int, int, int]:
-    """Smallest value that fell and smallest old value that rose (cap + 1 when none did), largest value."""
-    fell = np.int16(cap + 1)
-    rose = np.int16(cap + 1)
-    none = np.int16(cap + 1)
-    largest = np.int16(0)
-    for k in range(new.shape[0]):
-        fell = min(fell, new[k] if new[k] < old[k] else none)
-        rose = min(rose, old[k] if new[k] > old[k] else none)
-        largest = max(largest, new[k])
-    return int(fell), int(rose), int(largest)
-
-
-@nb.njit(cache=True)
-def _scan_column(state: UInt8, to_occupied: bool, cap: int, out: Int16) -> None:
-    """Squared distance along one column to its nearest source, capped."""
-    count = out.shape[0]
-    distance = cap
-    for k in range(count):
-        distance = 0 if (state[k] == _OCCUPIED) == to_occupied else min(distance + 1, cap)
-        out[k] = min(distance * distance, cap)
-    distance = cap
-    for k in range(count - 1, -1, -1):
-        distance = 0 if out[k] == 0 else min(distance + 1, cap)
-        out[k] = min(distance * distance, out[k])
-
-
-@nb.njit(cache=True)
-def _runs(columns: Int32, wanted: UInt8, first: int, last: int, runs: Int32) -> int:
-    """Group the wanted ones of sorted columns[first:last] into runs; rows of (begin, end)."""
-    count = 0
-    for n in range(first, last):
-        if wanted[n] == 0:
-            continue
-        column = columns[n]
-        if count > 0 and column - runs[count - 1, 1] <= _MERGE_GAP:
-            runs[count - 1, 1] = column + 1
-        else:
-            runs[count, 0] = column
-            runs[count, 1] = column + 1
-            count += 1
-    return count
-
-
-@nb.njit(cache=True)
-def _recompute_run(
-    target: Int16, source: Int16, begin: int, end: int, stride: int, limit: int, length: int
-) -> int:
-    """Compute flat target[begin:end] anew as the min over source shifted by whole strides.
-
-    The shift keeps inside the flat interval [limit, limit + length). Returns the largest result.
-    """
-    out = target[begin:end]
-    out[:] = source[begin:end]
-    largest = _largest(out)
-    offset = 1
-    while offset * offset < largest:
-        for sign in (-1, 1):
-            shift = sign * offset * stride
-            low = max(begin + shift, limit)
-            high = min(end + shift, limit + length)
-            if low < high:
-                _lower(target[low - shift : high - shift], source[low:high], offset * offset)
-        if offset & (offset - 1) == 0:  # looking at 1, 2, 4, 8 ... is enough to stop early
-            largest = _largest(out)
-        offset += 1
-    return int(_largest(out))
-
-
-@nb.njit(cache=True)
-def _stage_z(
-    state: UInt8, flagged: UInt8, box: Int32, shape: tuple[int, int, int], to_occupied: bool, cap: int,
-    g: Int16, columns: Int32, old: Int16, fell: Int32, rose: Int32,
-) -> int:  # fmt: skip
-    """Rescan flagged columns; list those that changed, in ascending order, with their old values."""
-    _, ny, nz = shape
-    count = 0
-    fresh = np.empty(nz, np.int16)
-    for x in range(box[0], box[1]):
-        for y in range(box[2], box[3]):
-            column = x * ny + y
-            if flagged[column] == 0:
-                continue
-            here = g[column * nz : (column + 1) * nz]
-            _scan_column(state[column * nz : (column + 1) * nz], to_occupied, cap, fresh)
-            fell[count], rose[count], _ = _compare(fresh, here, cap)
-            if fell[count] <= cap or rose[count] <= cap:
-                columns[count] = column
-                old[count * nz : (count + 1) * nz] = here
-                here[:] = fresh
-                count += 1
-    return count
-
-
-@nb.njit(cache=True)
-def _stage_y(
-    shape: tuple[int, int, int], cap: int, peak: Int16, g: Int16, h: Int16,
-    count_in: int, columns_in: Int32, old_in: Int16, fell_in: Int32, rose_in: Int32,
-    columns: Int32, old: Int16, fell: Int32, rose: Int32,
-) -> int:  # fmt: skip
-    """Carry the changed columns of g into h, plane by plane; list the columns of h that changed.
-
-    `peak` holds for each column of h an upper bound, beyond which no offset can matter to it.
-    """
-    _, ny, nz = shape
-    count = 0
-    before = np.empty(ny * nz, np.int16)
-    marked = np.zeros(ny, np.uint8)
-    runs = np.empty((ny, 2), np.int32)
-    wanted = (fell_in[:count_in] <= cap).astype(np.uint8)
-    rows = np.arange(ny).astype(np.int32)
-    widest = int(math.sqrt(cap))
-    first = 0
-    while first < count_in:  # groups in one plane whose reaches do not meet
-        x = columns_in[first] // ny
-        last = first
-        plane = x * ny
-        while (
-            last < count_in
-            and columns_in[last] < plane + ny
-            and (last == first or columns_in[last] - columns_in[last - 1] <= 2 * widest)
-        ):
-            last += 1
-        first_y, last_y = columns_in[first] - plane, columns_in[last - 1] - plane
-        bound = _largest(peak[plane + max(first_y - widest, 0) : plane + min(last_y + widest + 1, ny)])
-        reach = int(math.sqrt(bound))
-        low, high = max(first_y - reach, 0), min(last_y + reach + 1, ny)
-        before[low * nz : high * nz] = h[(plane + low) * nz : (plane + high) * nz]
-        total = _runs(columns_in, wanted, first, last, runs)
-        for n in range(total):
-            for offset in range(-reach, reach + 1):
-                begin = max(runs[n, 0] + offset, plane) * nz
-                end = min(runs[n, 1] + offset, plane + ny) * nz
-                if begin < end:
-                    shift = offset * nz
-                    _lower(h[begin:end], g[begin - shift : end - shift], offset * offset)
-        raised = False
-        for n in range(first, last):
-            if rose_in[n] > cap:
-                continue
-            raised = True
-            new = g[columns_in[n] * nz : (columns_in[n] + 1) * nz]
-            was = old_in[n * nz : (n + 1) * nz]
-            for y in range(low, high):
-                offset = columns_in[n] - plane - y
-                if marked[y] == 0 and offset * offset + rose_in[n] <= peak[plane + y]:
-                    here = h[(plane + y) * nz : (plane + y + 1) * nz]
-                    if _any_equal_raised(here, was, new, offset * offset):
-                        marked[y] = 1
-        if raised:
-            total = _runs(rows, marked, low, high, runs)
-            for n in range(total):
-                begin, end = (plane + runs[n, 0]) * nz, (plane + runs[n, 1]) * nz
-                _recompute_run(h, g, begin, end, nz, plane * nz, ny * nz)
-            marked[low:high] = 0
-        for y in range(low, high):
-            new = h[(plane + y) * nz : (plane + y + 1) * nz]
-            was = before[y * nz : (y + 1) * nz]
-            fell[count], rose[count], peak[plane + y] = _compare(new, was, cap)
-            if fell[count] <= cap or rose[count] <= cap:
-                columns[count] = plane + y
-                old[count * nz : (count + 1) * nz] = was
-                count += 1
-        first = last
-    return count
-
-
-@nb.njit(cache=True)
-def _stage_x(
-    shape: tuple[int, int, int], cap: int, bound: int, h: Int16, f: Int16,
-    count_in: int, columns_in: Int32, old_in: Int16, fell_in: Int32, rose_in: Int32,
-    marked: UInt8, touched: Int32,
-) -> int:  # fmt: skip
-    """Carry the changed columns of h into f; widen `touched`, each plane's range of y to look at."""
-    nx, ny, nz = shape
-    plane = ny * nz
-    runs = np.empty((ny, 2), np.int32)
-    wanted = (fell_in[:count_in] <= cap).astype(np.uint8)
-    raised_low, raised_high = nx, 0
-    first = 0
-    while first < count_in:
-        x = columns_in[first] // ny
-        last = first
-        lowest = cap
-        while last < count_in and columns_in[last] // ny == x:
-            lowest = min(lowest, fell_in[last])
-            last += 1
-        y_first, y_last = columns_in[first] - x * ny, columns_in[last - 1] - x * ny
-        total = _runs(columns_in, wanted, first, last, runs)
-        reach = int(math.sqrt(bound - lowest)) if bound > lowest else 0
-        for other in range(max(x - reach, 0), min(x + reach + 1, nx)):
-            if total > 0:
-                touched[other, 0] = min(touched[other, 0], y_first)
-                touched[other, 1] = max(touched[other, 1], y_last + 1)
-            shift = (other - x) * plane
-            for n in range(total):
-                begin, end = runs[n, 0] * nz, runs[n, 1] * nz
-                _lower(f[begin + shift : end + shift], h[begin:end], (other - x) * (other - x))
-        first = last
-    for n in range(count_in):
-        if rose_in[n] > bound:
-            continue
-        column = columns_in[n]
-        x, y = column // ny, column % ny
-        new = h[column * nz : (column + 1) * nz]
-        was = old_in[n * nz : (n + 1) * nz]
-        reach = int(math.sqrt(bound - rose_in[n]))
-        for other in range(max(x - reach, 0), min(x + reach + 1, nx)):
-            at = other * ny + y
-            if marked[at] == 0:
-                here = f[at * nz : (at + 1) * nz]
-                if _any_equal_raised(here, was, new, (other - x) * (other - x)):
-                    marked[at] = 1
-                    touched[other, 0] = min(touched[other, 0], y)
-                    touched[other, 1] = max(touched[other, 1], y + 1)
-                    raised_low, raised_high = min(raised_low, other), max(raised_high, other + 1)
-    rows = np.arange(ny).astype(np.int32)
-    for x in range(raised_low, raised_high):
-        low, high = touched[x, 0], touched[x, 1]
-        if low >= high:
-            continue
-        total = _runs(rows, marked[x * ny : (x + 1) * ny], low, high, runs)
-        for n in range(total):
-            begin, end = x * plane + runs[n, 0] * nz, x * plane + runs[n, 1] * nz
-            bound = max(bound, _recompute_run(f, h, begin, end, plane, 0, nx * plane))
-        marked[x * ny + low : x * ny + high] = 0
-    return bound
-
-
-@nb.njit(cache=True)
-def _list_changed(
-    shape: tuple[int, int, int], touched: Int32, outside: Int16, inside: Int16, published: Int16,
-    seen: UInt8, begins: Int32, ends: Int32,
-) -> tuple[int, int]:  # fmt: skip
-    """List, ascending, the part of each touched column that holds its changes; count parts and changes."""
-    nx, ny, nz = shape
-    count, total = 0, 0
-    for x in range(nx):
-        for y in range(touched[x, 0], touched[x, 1]):
-            begin = (x * ny + y) * nz
-            far, near = outside[begin : begin + nz], inside[begin : begin + nz]
-            was, fresh = published[begin : begin + nz], seen[begin : begin + nz]
-            changes, low, high = np.int16(0), np.int16(nz), np.int16(0)
-            for k in range(nz):
-                differs = (np.int16(far[k] - near[k]) != was[k]) | (fresh[k] != 0)
-                changes = np.int16(changes + differs)
-                low = min(low, np.int16(k) if differs else np.int16(nz))
-                high = max(high, np.int16(k + 1) if differs else np.int16(0))
-            if changes > 0:
-                begins[count] = begin + low
-                ends[count] = begin + high
-                count += 1
-                total += int(changes)
-        touched[x, 0] = ny
-        touched[x, 1] = 0
-    return count, total
-
-
-@nb.njit(cache=True)
-def _emit(
-    begins: Int32, ends: Int32, outside: Int16, inside: Int16, published: Int16, seen: UInt8,
-    table: Float32, cap: int, max_distance_m: float, distance: Float32,
-    voxel: Int32, old: Float32, new: Float32, first_seen: UInt8, occupied: UInt8,
-) -> None:  # fmt: skip
-    """Publish the distances of the listed parts and write the change log (with one spare row)."""
-    beyond = np.float32(max_distance_m)
-    count = np.uint64(0)  # unsigned: numba then leaves out the test for negative indices
-    for n in range(begins.shape[0]):
-        begin, end = begins[n], ends[n]
-        far, near = outside[begin:end], inside[begin:end]
-        was, fresh, metres = published[begin:end], seen[begin:end], distance[begin:end]
-        for k in range(end - begin):  # every row is written, and kept when it changed: no branches
-            value = np.int16(far[k] - near[k])
-            after = table[np.uint64(value + cap)]
-            voxel[count] = begin + k
-            old[count] = beyond if fresh[k] else metres[k]
-            new[count] = after
-            first_seen[count] = fresh[k]
-            occupied[count] = near[k] > 0
-            count += np.uint64((value != was[k]) | (fresh[k] != 0))
-            metres[k] = after
-        for k in range(end - begin):
-            was[k] = np.int16(far[k] - near[k])
-        fresh[:] = 0
-
-
-@nb.njit(cache=True)
-def _flag_columns(shape: tuple[int, int, int], voxels: Int32, flagged: UInt8, box: Int32) -> None:
-    """Flag the columns of flat voxels and widen their bounding box (x0, x1, y0, y1)."""
-    _, ny, nz = shape
-    for n in range(voxels.shape[0]):
-        column = voxels[n] // nz
-        x, y = column // ny, column % ny
-        flagged[column] = 1
-        box[0], box[1] = min(box[0], x), max(box[1], x + 1)
-        box[2], box[3] = min(box[2], y), max(box[3], y + 1)
-
-
-@nb.njit(cache=True)
-def _mark_seen(shape: tuple[int, int, int], voxels: Int32, seen: UInt8, touched: Int32) -> None:
-    """Mark voxels first seen and have their columns looked at."""
-    _, ny, nz = shape
-    for n in range(voxels.shape[0]):
-        column = voxels[n] // nz
-        x, y = column // ny, column % ny
-        seen[voxels[n]] = 1
-        touched[x, 0] = min(touched[x, 0], y)
-        touched[x, 1] = max(touched[x, 1], y + 1)
 
 
 def distance_table(voxel_size_m: float, max_distance_m: float) -> tuple[int, Float32]:
@@ -469,21 +137,21 @@ class SignedDistance:
         flat = state.reshape(-1)
         if flipped.size:
             box = np.array([self.shape[0], 0, self.shape[1], 0], np.int32)
-            _flag_columns(self.shape, flipped, self._flagged, box)
+            flag_columns(self.shape, flipped, self._flagged, box)
             self._propagate(self._outside, flat, box)
             self._propagate(self._inside, flat, box)
             flags = self._flagged.reshape(self.shape[:2])
             flags[box[0] : box[1], box[2] : box[3]] = 0
         if first_seen.size:
-            _mark_seen(self.shape, first_seen, self._seen, self._touched)
+            mark_seen(self.shape, first_seen, self._seen, self._touched)
         begins, ends = self._changed[0][0], self._changed[1][0]  # free again by now
-        parts, total = _list_changed(
+        parts, total = list_changed(
             self.shape, self._touched, self._outside.along_x, self._inside.along_x, self._published,
             self._seen, begins, ends,
         )  # fmt: skip
         kinds = (np.int32, np.float32, np.float32, np.uint8, np.uint8)
         log: tuple[Any, ...] = tuple(np.empty(total + 1, kind) for kind in kinds)
-        _emit(
+        emit(
             begins[:parts], ends[:parts], self._outside.along_x, self._inside.along_x, self._published,
             self._seen, self._table, self.cap, self.max_distance_m, self.distance.reshape(-1), *log,
         )  # fmt: skip
@@ -499,13 +167,13 @@ class SignedDistance:
 
     def _propagate(self, stages: _Stages, state: UInt8, box: Int32) -> None:
         first, second = self._changed
-        count = _stage_z(
+        count = carry_z(
             state, self._flagged, box, self.shape, stages.to_occupied, self.cap, stages.along_z, *first
         )
-        count = _stage_y(
+        count = carry_y(
             self.shape, self.cap, stages.peak_y, stages.along_z, stages.along_y, count, *first, *second
         )
-        stages.bound_x = _stage_x(
+        stages.bound_x = carry_x(
             self.shape, self.cap, stages.bound_x, stages.along_y, stages.along_x, count, *second,
             self._marked, self._touched,
         )  # fmt: skip

@@ -43,6 +43,7 @@ _UNKNOWN, _FREE, _OCCUPIED = 0, 1, 2  # of `mapping.base`; literals so that kern
 # bits of a live voxel's byte: 0-1 state, 2 on the list of changes, 3-7 evidence
 _STATE, _LISTED, _EVIDENCE = 3, 4, 3
 LARGEST_EVIDENCE = 31
+_LONGEST = 30_000  # voxels along an axis: kernels count them in 16 bits
 _BYTES_PER_VOXEL = 50  # TSDF and state 7, ESDF 19, lists at their longest 16, Open3D's blocks 8
 
 
@@ -164,6 +165,8 @@ def grid_shape(
     if size.shape != (2, 3) or not np.isfinite(size).all() or np.any(size[1] <= size[0]):
         raise WorldError(f"bounds_m must be a finite box (2, 3), lower < upper, got {np.asarray(bounds_m)}")
     count = np.ceil((size[1] - size[0]) / voxel_size_m - 1e-6).clip(1)
+    if count.max() > _LONGEST:
+        raise WorldError(f"a map may be {_LONGEST} voxels long at most, got {count.max():.0f}")
     need_mb = float(np.prod(count)) * bytes_per_voxel / 1e6
     if need_mb > max_memory_mb or float(np.prod(count)) > 2**31 - 1:
         extent = " x ".join(f"{edge:.6g}" for edge in size[1] - size[0])
