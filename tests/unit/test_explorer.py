@@ -30,11 +30,8 @@ def scipy_lengths(passable: np.ndarray, cost: np.ndarray, source: tuple[int, int
                 a, b = i + di, j + dj
                 if not (0 <= a < nx and 0 <= b < ny and passable[a, b]):
                     continue
-                if (
-                    not (passable[i, j] or (i, j) == source)
-                    or not (passable[a, j] and passable[i, b])
-                    and di
-                    and dj
+                if not (passable[i, j] or (i, j) == source) or (
+                    not (passable[a, j] and passable[i, b]) and di and dj
                 ):
                     continue
                 rows.append(i * ny + j)

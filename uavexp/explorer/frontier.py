@@ -27,7 +27,6 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
-from uavexp.mapping.projection import PlanarMap, project
 
 from uavexp.errors import require, require_non_negative, require_option, require_positive
 from uavexp.explorer.planar import (
@@ -42,6 +41,7 @@ from uavexp.explorer.planar import (
     unknown_within,
 )
 from uavexp.mapping.base import DistanceField
+from uavexp.mapping.projection import PlanarMap, project
 from uavexp.types import Bool, Float, Float32, Goal, Limits, Observation
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
-from uavexp.scene import Scene
 
+from uavexp.scene import Scene
 from uavexp.types import Scan, State
 
 
