@@ -177,7 +177,7 @@ class Pilot:
         return result
 
     def _plan_request(self, observation: Observation, goal: Goal) -> PlanRequest:
-        """From the reference at t + latency; from the measured state when that is far off or inside an obstacle."""
+        """From the reference at t + latency; from the measured state if that is far off or in an obstacle."""
         start_s = observation.time_s + self.latency_s
         state = observation.state
         position_m, velocity_mps, acceleration_mps2 = self._planned_state(start_s)

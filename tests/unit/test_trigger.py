@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -90,6 +91,11 @@ LITERAL = {
 }
 
 
+def mcr(**values: object) -> Mcr:
+    """The policy with a horizon that holds the obstacles of these tests, 2 s ahead."""
+    return Mcr(**{"horizon_s": 2.5, **values})
+
+
 def test_changed_near_is_the_equation_by_brute_force() -> None:
     rng = np.random.default_rng(0)
     shape = np.array([9, 7, 5])
@@ -109,15 +115,15 @@ def test_changed_near_is_the_equation_by_brute_force() -> None:
 def test_literal_fires_on_any_voxel_in_the_tube_and_on_none_outside() -> None:
     free = room()
     beside = room(((3.0, 3.2, 1.0), (3.2, 3.4, 1.2)))  # 1.15 m from the path
-    assert decide(Mcr(**LITERAL), free, beside).cause == "map"
-    assert not decide(Mcr(**LITERAL, monitor_radius_m=0.5, delta_map_m=1.3), free, beside).replan
+    assert decide(mcr(**LITERAL), free, beside).cause == "map"
+    assert not decide(mcr(**LITERAL, monitor_radius_m=0.5, delta_map_m=1.3), free, beside).replan
 
 
 def test_path_rule_ignores_a_change_that_leaves_the_plan_valid() -> None:
     free = room()
     beside, on_it = room(((3.0, 3.2, 1.0), (3.2, 3.4, 1.2))), room(((3.0, 2.3, 1.0), (3.2, 2.5, 1.2)))
-    assert not decide(Mcr(), free, beside).replan
-    fired = decide(Mcr(), free, on_it)
+    assert not decide(mcr(), free, beside).replan
+    fired = decide(mcr(), free, on_it)
     assert fired.replan
     assert fired.cause == "map"
     assert len(fired.voxel) > 0
@@ -131,35 +137,40 @@ def test_path_rule_waits_until_the_violation_is_near() -> None:
     assert decide(Mcr(horizon_s=5.0), free, ahead, time_s=1.5).replan
 
 
+def test_a_small_drop_to_where_the_body_would_touch_is_enough() -> None:
+    """0.25 m to 0.15 m: less than delta_map, but the body circle is 0.226 m."""
+    near, nearer = room(((2.0, 2.3, 1.0), (3.0, 2.5, 1.2))), room(((2.0, 2.2, 1.0), (3.0, 2.5, 1.2)))
+    assert decide(mcr(), near, nearer).replan
+    assert not decide(mcr(), nearer, nearer).replan  # as planned
+
+
 def test_only_the_remaining_trajectory_counts_unless_whole() -> None:
     free, behind = room(), room(((1.0, 2.0, 1.0), (1.2, 2.1, 1.2)))
-    assert not decide(Mcr(), free, behind, time_s=3.0).replan
-    assert decide(Mcr(extent="whole"), free, behind, time_s=3.0).replan
+    assert not decide(mcr(), free, behind, time_s=3.0).replan
+    assert decide(mcr(extent="whole"), free, behind, time_s=3.0).replan
 
 
 def test_changes_accumulate_since_the_plan_but_not_between_updates() -> None:
     """Two steps of 0.1 m are a drop of 0.2 m since the plan, and of 0.1 m since the update."""
     steps = [room(((2.0, y, 1.0), (3.0, y + 0.1, 1.1))) for y in (2.7, 2.6, 2.5)]
     for since, expected in (("plan", True), ("update", False)):
-        policy = Mcr(since=since, valid_clearance_m=0.6)
+        policy = mcr(since=since, valid_clearance_m=0.6)
         policy.reset(LIMITS)
         policy.planned(STRAIGHT, steps[0])
-        fired = [
-            policy.decide(observe(b, change(a, b))).replan for a, b in zip(steps, steps[1:], strict=False)
-        ]
+        fired = [policy.decide(observe(b, change(a, b))).replan for a, b in pairwise(steps)]
         assert any(fired) is expected
 
 
 def test_growing_clearance_is_no_contraction() -> None:
     near, free = room(((3.0, 2.3, 1.0), (3.2, 2.5, 1.2))), room()
-    assert not decide(Mcr(**{**LITERAL, "sign": "contraction"}), near, free).replan
-    assert decide(Mcr(**LITERAL), near, free).replan
+    assert not decide(mcr(**{**LITERAL, "sign": "contraction"}), near, free).replan
+    assert decide(mcr(**LITERAL), near, free).replan
 
 
 @pytest.mark.parametrize(("first_sight", "expected"), [("none", False), ("occupied", True), ("all", True)])
 def test_first_sights_count_as_configured(first_sight: str, expected: bool) -> None:
     free, wall = room(), room(((3.0, 2.0, 1.0), (3.2, 2.2, 1.2)))
-    policy = Mcr(**{**LITERAL, "first_sight": first_sight})
+    policy = mcr(**{**LITERAL, "first_sight": first_sight})
     policy.reset(LIMITS)
     policy.planned(STRAIGHT, free)
     assert policy.decide(observe(wall, change(free, wall, first_seen=True))).replan is expected
@@ -175,7 +186,7 @@ def test_first_seen_free_space_never_fires_the_default() -> None:
         first_seen=np.ones(100, dtype=bool),
         occupied=np.zeros(100, dtype=bool),
     )
-    for policy in (Mcr(), Mcr(judge="region", since="update")):
+    for policy in (mcr(), mcr(judge="region", since="update")):
         policy.reset(LIMITS)
         policy.planned(STRAIGHT, free)
         assert not policy.decide(observe(free, update)).replan
@@ -184,10 +195,10 @@ def test_first_seen_free_space_never_fires_the_default() -> None:
 def test_goal_drift_is_measured_against_the_flown_goal_or_the_previous_one() -> None:
     free = room()
     none = change(free, free)
-    assert decide(Mcr(), free, free, goal=goal_at(3.0), best_goal=goal_at(3.29)).replan is False
-    drifted = decide(Mcr(), free, free, goal=goal_at(3.0), best_goal=goal_at(3.31))
+    assert decide(mcr(), free, free, goal=goal_at(3.0), best_goal=goal_at(3.29)).replan is False
+    drifted = decide(mcr(), free, free, goal=goal_at(3.0), best_goal=goal_at(3.31))
     assert drifted.cause == "goal"
-    literal = Mcr(**LITERAL)
+    literal = mcr(**LITERAL)
     literal.reset(LIMITS)
     literal.planned(STRAIGHT, free)
     fired = [
@@ -204,18 +215,18 @@ def test_firing_is_monotone_in_the_thresholds() -> None:
         y = rng.uniform(2.2, 3.0)
         after = room(((3.0, y, 1.0), (3.2, y + 0.1, 1.2)))
         fired = [
-            decide(Mcr(delta_map_m=d, valid_clearance_m=0.8), free, after).replan
+            decide(mcr(delta_map_m=d, valid_clearance_m=0.8), free, after).replan
             for d in (0.05, 0.3, 0.9, 1.5)
         ]
         assert fired == sorted(fired, reverse=True)
-        fired = [decide(Mcr(valid_clearance_m=c), free, after).replan for c in (0.2, 0.4, 0.6, 0.9)]
+        fired = [decide(mcr(valid_clearance_m=c), free, after).replan for c in (0.2, 0.4, 0.6, 0.9)]
         assert fired == sorted(fired)
 
 
 def test_no_replan_within_the_least_interval() -> None:
     free, on_it = room(), room(((3.0, 2.0, 1.0), (3.2, 2.2, 1.2)))
-    assert not decide(Mcr(min_interval_s=0.6), free, on_it, time_s=1.5).replan
-    assert decide(Mcr(min_interval_s=0.4), free, on_it, time_s=1.5).replan
+    assert not decide(mcr(min_interval_s=0.6), free, on_it, time_s=1.5).replan
+    assert decide(mcr(min_interval_s=0.4), free, on_it, time_s=1.5).replan
 
 
 @pytest.mark.parametrize("interval_s", [0.5, 1.0, 0.7, 5.0])

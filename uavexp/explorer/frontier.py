@@ -101,7 +101,7 @@ class Frontier:
     band_below_m: float = 0.2
     band_above_m: float = 0.2
     min_distance_m: float = 0.8
-    commit_m: float = 1.0
+    commit_m: float = 0.8
     hysteresis: float = 2.0
     visited_m: float = 0.5
     escape_m: float = 0.6

@@ -10,7 +10,8 @@ checks while anything new is in view. §3.4 calls it a "planning validity violat
 variations rather than instantaneous measurements". So every part of the reading is a
 parameter. `judge: region` is the equation; `judge: path` (the default) asks the same of
 the trajectory's own points: the clearance there has dropped by more than delta_map since
-the plan was made, to below `valid_clearance_m`, at a point reached within `horizon_s`.
+the plan was made, to below `valid_clearance_m`, at a point reached within `horizon_s`; or
+that it has dropped at all to where the body would touch.
 A plan whose room has not shrunk is valid however much the map changes beside it; a change
 further ahead keeps accumulating until it matters, and is then answered by one replan.
 """
@@ -30,6 +31,7 @@ from uavexp.trigger.change import changed_near
 from uavexp.types import Decision, Float, Goal, Int32, Limits, Observation, Trajectory
 
 _SAMPLE_S = 0.05  # at 2.5 m/s about one voxel apart
+_NOISE_M = 0.01  # a smaller drop is no drop
 
 
 class Judge(StrEnum):
@@ -86,8 +88,9 @@ class Mcr:
     sign: Sign = Sign.CONTRACTION
     min_changed_voxels: int = 1
     valid_clearance_m: float = 0.4
-    horizon_s: float = 2.0
+    horizon_s: float = 1.0
     min_interval_s: float = 0.0
+    _touch_m: float = field(init=False, repr=False, default=0.0)
     _trajectory: Trajectory | None = field(init=False, repr=False, default=None)
     _at_plan: DistanceField | None = field(init=False, repr=False, default=None)
     _planned_s: float = field(init=False, repr=False, default=-math.inf)
@@ -117,6 +120,7 @@ class Mcr:
 
     def reset(self, limits: Limits) -> None:
         """Begin a trial."""
+        self._touch_m = limits.body_radius_m
         self._trajectory, self._at_plan, self._previous_goal = None, None, None
         self._planned_s = -math.inf
 
@@ -164,7 +168,9 @@ class Mcr:
             self._clearance_m[part] = now_m
         size_m = np.abs(change_m) if self.sign is Sign.BOTH else change_m
         soon = self._times_s[part] - observation.time_s <= self.horizon_s
-        violated = (size_m > self.delta_map_m) & (now_m < self.valid_clearance_m) & soon
+        invalid = (size_m > self.delta_map_m) & (now_m < self.valid_clearance_m)
+        touching = (change_m > _NOISE_M) & (now_m < self._touch_m)
+        violated = (invalid | touching) & soon
         score = float(size_m[soon].max(initial=0.0)) / self.delta_map_m
         if not violated.any():
             return Decision(replan=False, score=score)
