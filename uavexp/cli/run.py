@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from uavexp.cli.composition import Cell, Command
-from uavexp.cli.flight import Trial, check_world, fly_cell, repeat_command
+from uavexp.cli.composition import Command
+from uavexp.cli.flight import check_world, fly_cell, repeat_command
+from uavexp.cli.job import Job, Result
 from uavexp.cli.outputs import folder_name, laps, output_folder, reason_of, write_failure, write_trial
 from uavexp.cli.rows import failed_row, flown_row
 from uavexp.cli.terminal import Terminal
@@ -17,27 +17,6 @@ from uavexp.errors import ConfigError, RecordError, UavexpError
 from uavexp.kernel_cache import has_kernels
 from uavexp.records import code_digest, lock_digest
 from uavexp.table import TABLE, write_table
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Job:
-    """One trial to fly and where its files go."""
-
-    cell: Cell
-    seed: int
-    folder: str
-    command: str  # that repeats it
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Result:
-    """What became of a job."""
-
-    job: Job
-    row: dict[str, Any]
-    trial: Trial | None  # None when it raised
-    reason: str = ""
-
 
 Fly = Callable[[Job], Result]
 

@@ -17,7 +17,7 @@ from uavexp.records import PICTURE
 
 if TYPE_CHECKING:
     from uavexp.cli.flight import Progress as FlightProgress
-    from uavexp.cli.run import Job, Result
+    from uavexp.cli.job import Job, Result
 
 _PATIENCE_S = 2.0  # nothing is shown for work that is done sooner
 _PLAIN_PERIOD_S = 10.0  # between lines when the output is no terminal
