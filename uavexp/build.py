@@ -33,7 +33,15 @@ GROUPS = (
     "safety",
     "mission",
 )
-TOP_LEVEL = ("step_s", "latency_s", "start_bubble_m", "restart_error_m", "stuck_s", "yaw_lookahead_s")
+TOP_LEVEL = (
+    "step_s",
+    "latency_s",
+    "start_bubble_m",
+    "settle_s",
+    "restart_error_m",
+    "stuck_s",
+    "yaw_lookahead_s",
+)
 TARGET = "_target_"
 
 

@@ -21,10 +21,11 @@ from uavexp.planner.brake import braking_trajectory
 from uavexp.recorder import Stopwatch
 from uavexp.safety.base import Safety
 from uavexp.trigger.base import TriggerPolicy
+from uavexp.trigger.change import changed_near
 from uavexp.types import (
     Float,
-    Float32,
     Goal,
+    Int32,
     Limits,
     Observation,
     PlanRequest,
@@ -37,6 +38,7 @@ from uavexp.types import (
 
 _GOALS_PER_REQUEST = 3  # so many goals are tried before the vehicle brakes [ours]
 _LOOK_RADPS = 0.8  # [ours]
+_NEAR_M, _CHANGED_M = 2.0, 0.15  # r_mon and delta_map of paper 1
 _SAMPLE_S = 0.1  # spacing of the samples kept of a trajectory
 
 
@@ -59,6 +61,7 @@ class Pilot:
     limits: Limits
     watch: Stopwatch
     latency_s: float
+    settle_s: float  # no plan before the map has seen as much
     restart_error_m: float
     yaw_lookahead_s: float
     yaw_rate_radps: float  # kept below the body-rate limit: roll and pitch need their share
@@ -125,6 +128,8 @@ class Pilot:
     def explore(self, observation: Observation) -> None:
         """Update g*; while without a valid plan, try again."""
         self._select(observation, fresh=False)
+        if observation.time_s < self.settle_s - 1e-9:
+            return
         if self.trajectory is None and not self.replans:
             self.request("first", observation)
         elif self.failure and not (self._wait_for_rest and self._moving(observation.time_s)):
@@ -138,12 +143,11 @@ class Pilot:
         with self.watch.lap("trigger"):
             decision = self.trigger.decide(observation)
         if decision.replan and self.trajectory is not None and not self._wait_for_rest:
-            changed_m = observation.field.voxel_centres_m(decision.voxel).astype(np.float32)
-            self.request(decision.cause, observation, decision.score, changed_m)
+            self.request(decision.cause, observation, decision.score, decision.voxel)
         return decision.score
 
     def request(
-        self, cause: str, observation: Observation, score: float = 0.0, changed_m: Float32 | None = None
+        self, cause: str, observation: Observation, score: float = 0.0, fired: Int32 | None = None
     ) -> None:
         """Plan to the best goal, else to the next best; brake when there is no plan."""
         if self._pending is not None:
@@ -154,7 +158,7 @@ class Pilot:
             if goal is None:
                 break
             result = self._plan(observation, goal)
-            self._note(cause, score, observation, goal, result, changed_m)
+            self._note(cause, score, observation, goal, result, fired)
             if result.trajectory is not None:
                 self._accept(result.trajectory, goal, observation)
                 return
@@ -214,8 +218,9 @@ class Pilot:
         observation: Observation,
         goal: Goal,
         result: PlanResult,
-        changed_m: Float32 | None,
+        fired: Int32 | None,
     ) -> None:
+        voxel = fired if fired is not None and len(fired) > 0 else _changed_nearby(observation)
         new_m = np.zeros((0, 3))
         change_m, effective_s = math.nan, math.nan
         if result.trajectory is not None:
@@ -236,7 +241,7 @@ class Pilot:
                 path_change_m=change_m,
                 iterations=result.iterations,
                 expansions=result.expansions,
-                changed_m=np.zeros((0, 3), dtype=np.float32) if changed_m is None else changed_m,
+                changed_m=observation.field.voxel_centres_m(voxel).astype(np.float32),
                 trajectory_m=new_m.astype(np.float32),
             )
         )
@@ -278,6 +283,28 @@ def with_stop(trajectory: Trajectory, limits: Limits) -> Trajectory:
         coefficients=np.concatenate(pieces),
         at_rest=True,
     )
+
+
+def _changed_nearby(observation: Observation) -> Int32:
+    """Voxels of this update whose distance shrank by more than delta_map within r_mon of the vehicle.
+
+    What any policy is asked for: how many of its replans lie near a structural change.
+    """
+    update, field_ = observation.update, observation.field
+    counted = ~update.first_seen | update.occupied
+    voxel: Int32 = changed_near(
+        update.voxel[counted],
+        update.old_distance_m[counted],
+        update.new_distance_m[counted],
+        np.array(field_.distance.shape),
+        field_.origin_m,
+        field_.voxel_size_m,
+        observation.state.position_m[None],
+        _NEAR_M,
+        _CHANGED_M,
+        False,
+    )[0]
+    return voxel
 
 
 def _samples(trajectory: Trajectory, from_s: float) -> Float:

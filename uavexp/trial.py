@@ -49,15 +49,18 @@ class Parts:
     step_s: float = 0.01
     latency_s: float = 0.03
     start_bubble_m: float = 0.6
+    settle_s: float = 0.5
     restart_error_m: float = 0.4
     stuck_s: float = 20.0
     yaw_lookahead_s: float = 0.8
 
     def __post_init__(self) -> None:
-        require_positive(step_s=self.step_s, restart_error_m=self.restart_error_m, stuck_s=self.stuck_s)
+        require_positive(step_s=self.step_s, stuck_s=self.stuck_s)
         require_non_negative(
             latency_s=self.latency_s,
             start_bubble_m=self.start_bubble_m,
+            settle_s=self.settle_s,
+            restart_error_m=self.restart_error_m,
             yaw_lookahead_s=self.yaw_lookahead_s,
         )
         steps_per(self.step_s, "latency_s", self.latency_s)
@@ -180,6 +183,7 @@ def _reset(parts: Parts, world: World, scene: Scene, start: State, seed: int, wa
         limits=limits,
         watch=watch,
         latency_s=parts.latency_s,
+        settle_s=parts.settle_s,
         restart_error_m=parts.restart_error_m,
         yaw_lookahead_s=parts.yaw_lookahead_s,
         yaw_rate_radps=0.9 * limits.max_body_rate_radps,

@@ -309,14 +309,14 @@ class Replan:
     effective_s: float  # when the new plan took over; NaN when it failed
     cause: str  # "first", "map", "goal", "clock", "brake", ...
     score: float
-    position_m: Float  # (3,) true position at the trigger
+    position_m: Float  # (3,) estimated position at the trigger
     goal_m: Float  # (3,)
     status: PlanStatus
     reason: str
     path_change_m: float  # largest distance of the old remaining path from the new one; NaN if none
     iterations: int
     expansions: int
-    changed_m: Float32  # (N, 3) voxel centres whose change fired it (figure 10); may be empty
+    changed_m: Float32  # (N, 3) voxel centres whose change fired it (figure 10); other causes: changed nearby
     trajectory_m: Float32  # (P, 3) samples of the new trajectory (drawn in pictures); may be empty
 
 

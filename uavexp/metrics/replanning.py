@@ -47,7 +47,7 @@ def share_near_change(replans: Sequence[Replan], near_m: float) -> float:
     """Share of replans with a changed voxel within `near_m` of the vehicle or its new plan.
 
     [ours] The reading of "replans near a structural change": 1 means that the map was
-    the reason every time. A policy that names no voxels (a clock) has 0. NaN without replans.
+    changing there every time, whatever the policy's cause. NaN without replans.
     """
     if not replans:
         return float("nan")
