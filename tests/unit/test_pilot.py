@@ -1,0 +1,150 @@
+"""The pilot with the real planner in small rooms: latency, continuity, failure, brake, retry."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.fields import box, empty, field_from
+from tests.unit.test_trigger import LIMITS, change, observe
+from uavexp.explorer.target_only import TargetOnly
+from uavexp.geometry import evaluate
+from uavexp.mapping.base import DistanceField
+from uavexp.pilot import Pilot, with_stop
+from uavexp.planner.brake import stopping_distance_m
+from uavexp.planner.min_acc import MinAcc
+from uavexp.recorder import Stopwatch
+from uavexp.safety.brake import Brake
+from uavexp.safety.none import NoBrake
+from uavexp.trigger.ssp import Ssp
+from uavexp.trigger.tbr import Tbr
+from uavexp.types import Observation, PlanStatus, Reference, State, Trajectory
+
+START, TARGET = np.array([1.0, 2.0, 1.0]), np.array([9.0, 2.0, 1.0])
+BOUNDS = np.array([[0.0, 0.0, 0.0], [10.0, 4.0, 2.0]])
+
+
+def room(*, walled: bool = False) -> DistanceField:
+    grid = empty((10.0, 4.0, 2.0))
+    if walled:
+        box(grid, (6.0, 0.0, 0.0), (6.2, 4.0, 2.0))
+    return field_from(grid)
+
+
+def make(trigger: Tbr | Ssp, safety: NoBrake | Brake | None = None) -> Pilot:
+    planner, explorer, safety = MinAcc(), TargetOnly(), safety or NoBrake()
+    planner.reset(LIMITS, np.random.default_rng(0))
+    explorer.reset(1.0, LIMITS)
+    trigger.reset(LIMITS)
+    safety.reset(LIMITS)
+    return Pilot(
+        explorer=explorer,
+        trigger=trigger,
+        planner=planner,
+        safety=safety,
+        limits=LIMITS,
+        watch=Stopwatch(),
+        latency_s=0.03,
+        settle_s=0.0,
+        restart_error_m=0.4,
+        yaw_lookahead_s=0.8,
+        yaw_rate_radps=1.8,
+        flight_bounds_m=BOUNDS,
+        hover_m=START,
+        yaw_rad=0.0,
+    )
+
+
+def see(field: DistanceField, time_s: float, reference: Reference) -> Observation:
+    """The vehicle is exactly where the reference is."""
+    state = State(
+        position_m=reference.position_m,
+        velocity_mps=reference.velocity_mps,
+        quaternion_wxyz=np.array([1.0, 0.0, 0.0, 0.0]),
+        body_rate_radps=np.zeros(3),
+    )
+    seen = observe(field, change(field, field), time_s=time_s)
+    return replace(seen, state=state, reference=reference, target_m=TARGET, flight_bounds_m=BOUNDS)
+
+
+def fly(pilot: Pilot, fields: dict[float, DistanceField], until_s: float) -> np.ndarray:
+    """References (N, 3) every 10 ms; the map changes at the given times."""
+    positions = []
+    for step in range(round(until_s / 0.01)):
+        time_s = step * 0.01
+        field = fields[max(t for t in fields if t <= time_s)]
+        reference = pilot.reference(time_s, 0.01)
+        seen = replace(see(field, time_s, reference), trajectory=pilot.trajectory)
+        if step % 20 == 0:
+            pilot.explore(seen)
+        if step % 10 == 0:
+            pilot.decide(replace(seen, best_goal=pilot.best_goal, goal=pilot.goal))
+        positions.append(reference.position_m)
+    return np.array(positions)
+
+
+def speeds(positions: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(np.diff(positions, axis=0), axis=1) / 0.01
+
+
+def test_a_plan_takes_effect_after_the_latency_and_not_before() -> None:
+    pilot = make(Ssp())
+    positions = fly(pilot, {0.0: room()}, 6.0)
+    np.testing.assert_allclose(positions[:4], np.broadcast_to(START, (4, 3)), atol=1e-12)
+    assert pilot.trajectory is not None
+    assert pilot.trajectory.start_s == pytest.approx(0.03)
+    np.testing.assert_allclose(positions[-1], TARGET, atol=1e-6)
+
+
+def test_replans_join_without_a_jump_in_position_or_speed() -> None:
+    pilot = make(Tbr(interval_s=0.5))
+    positions = fly(pilot, {0.0: room()}, 6.0)
+    assert len(pilot.replans) > 5
+    assert np.abs(np.diff(speeds(positions))).max() <= 2.5 * 0.01 * 1.05
+    np.testing.assert_allclose(positions[-1], TARGET, atol=1e-3)
+
+
+def test_without_a_plan_it_brakes_within_the_stopping_distance_holds_and_goes_on_when_it_can() -> None:
+    pilot = make(Tbr(interval_s=1.0))
+    positions = fly(pilot, {0.0: room(), 1.95: room(walled=True), 6.0: room()}, 12.0)
+    failed = next(replan for replan in pilot.replans if replan.status is not PlanStatus.OK)
+    at_failure = round(failed.time_s / 0.01)
+    stop_m = stopping_distance_m(float(speeds(positions)[at_failure]), LIMITS)
+    held = positions[590]
+    assert np.linalg.norm(held - positions[at_failure]) <= stop_m * 1.1 + 0.15
+    np.testing.assert_allclose(positions[500:595], np.broadcast_to(held, (95, 3)), atol=1e-9)
+    assert any(replan.cause == "retry" and replan.status is PlanStatus.OK for replan in pilot.replans)
+    np.testing.assert_allclose(positions[-1], TARGET, atol=1e-3)
+    assert pilot.failure == ""
+
+
+def test_failed_requests_are_bounded_by_the_explorers_rate() -> None:
+    pilot = make(Ssp())
+    fly(pilot, {0.0: room(walled=True)}, 10.0)
+    assert not pilot.ever_planned
+    assert pilot.failure
+    assert 1 <= len(pilot.replans) <= 51
+
+
+def test_safety_stops_before_the_wall_that_single_shot_would_fly_into() -> None:
+    for safety, stops in ((NoBrake(), False), (Brake(stop_at_unknown=False), True)):
+        pilot = make(Ssp(), safety)
+        positions = fly(pilot, {0.0: room(), 1.5: room(walled=True)}, 8.0)
+        assert bool(positions[:, 0].max() < 6.0 - LIMITS.body_radius_m) is stops
+
+
+def test_a_moving_end_is_followed_by_a_stop() -> None:
+    moving = Trajectory(
+        breaks_s=np.array([0.0, 2.0]),
+        coefficients=np.array([[[0.0, 0.0, 1.0], [1.5, 0.0, 0.0]]]),
+        at_rest=False,
+    )
+    flown = with_stop(moving, LIMITS)
+    position, velocity, acceleration = evaluate(flown, np.linspace(0.0, flown.end_s, 2001))
+    assert np.abs(np.diff(velocity[:, 0])).max() < 0.01
+    assert np.linalg.norm(velocity[-1]) < 1e-9
+    assert np.abs(acceleration).max() <= 2.5 + 1e-9
+    assert position[-1, 0] == pytest.approx(3.0 + stopping_distance_m(1.5, LIMITS), abs=1e-6)
+    assert with_stop(flown, LIMITS) is flown
