@@ -26,6 +26,10 @@ STRATEGIES: dict[str, list[str]] = {
     **{f"TBR {s} s": ["strategy=tbr", f"trigger.interval_s={s}"] for s in ("0.5", "1", "2", "3", "5")},
     "SSP": ["strategy=ssp"],
 }
+# explorer=target_only is the second table: what SSP flies, and the cleanest comparison of triggers
+CELLS = [("frontier", name) for name in STRATEGIES if name != "SSP"] + [
+    ("target_only", name) for name in ("SSP", "MCR", "TBR 0.5 s", "TBR 1 s", "TBR 2 s")
+]
 COLUMNS = {
     "success %": lambda rows: f"{100 * rows.success.mean():.0f} {wilson(int(rows.success.sum()), len(rows))}",
     "contacts": lambda rows: f"{rows.collision_count.mean():.2f}",
@@ -70,6 +74,8 @@ def table(explorer: str) -> str:
     """Markdown, one row per strategy, n and interval in it."""
     lines = [f"| explorer={explorer} | n | {' | '.join(COLUMNS)} |", "|---" * (len(COLUMNS) + 2) + "|"]
     for name in STRATEGIES:
+        if (explorer, name) not in CELLS and name != "SSP":
+            continue
         rows = pd.read_parquet(folder(name, explorer) / "trials.parquet")
         figures = " | ".join(column(rows) for column in COLUMNS.values())
         lines.append(f"| {name} | {len(rows)} | {figures} |")
@@ -79,8 +85,7 @@ def table(explorer: str) -> str:
 def main() -> None:
     """Fly what is missing, print both tables."""
     seeds = sys.argv[1] if len(sys.argv) > 1 else "0:10"
-    cells = [(name, explorer, seeds) for explorer in ("frontier", "target_only") for name in STRATEGIES]
-    cells = [cell for cell in cells if cell[:2] != ("SSP", "frontier")]
+    cells = [(name, explorer, seeds) for explorer, name in CELLS]
     with ThreadPoolExecutor(2) as pool:
         list(pool.map(fly, cells))
     for explorer in ("frontier", "target_only"):

@@ -129,6 +129,7 @@ def make_replan(time_s: float, cause: str, *, ok: bool = True, **fields: Any) ->
         "path_change_m": 0.0 if ok else float("nan"),
         "iterations": 1,
         "expansions": 1,
+        "near_change": False,
         "changed_m": np.zeros((0, 3), dtype=np.float32),
         "trajectory_m": np.zeros((0, 3), dtype=np.float32),
     }

@@ -33,15 +33,17 @@ GROUPS = (
     "safety",
     "mission",
 )
-TOP_LEVEL = (
-    "step_s",
-    "latency_s",
-    "start_bubble_m",
-    "settle_s",
-    "restart_error_m",
-    "stuck_s",
-    "yaw_lookahead_s",
-)
+TOP_LEVEL = {
+    "step_s": float,
+    "latency_s": float,
+    "start_bubble_m": float,
+    "settle_s": float,
+    "restart_error_m": float,
+    "stuck_s": float,
+    "goals_per_request": int,
+    "look_around_radps": float,
+    "yaw_lookahead_s": float,
+}
 TARGET = "_target_"
 
 
@@ -59,7 +61,7 @@ def check_config(config: Mapping[str, Any], options: Mapping[str, str]) -> dict[
         ConfigError: a wrong class, an unknown or missing parameter, a wrong type; every
             constructor has accepted its values when this returns.
     """
-    checked: dict[str, Any] = {key: check_value(key, config[key], float) for key in TOP_LEVEL}
+    checked: dict[str, Any] = {key: check_value(key, config[key], kind) for key, kind in TOP_LEVEL.items()}
     for group in GROUPS:
         tree = config[group]
         if not isinstance(tree, Mapping) or TARGET not in tree:
@@ -84,6 +86,7 @@ def build(config: Mapping[str, Any]) -> Parts:
     except ArithmeticError as error:
         raise ConfigError(f"a rate or period does not fit the step: {error}") from error
     _check_monitored_distance(parts)
+    _check_endings(parts)
     return parts
 
 
@@ -177,3 +180,13 @@ def _check_monitored_distance(parts: Parts) -> None:
         raise ConfigError(
             f"mapping.max_distance_m must be >= trigger.monitor_radius_m = {radius_m}, got {reach_m}"
         )
+
+
+def _check_endings(parts: Parts) -> None:
+    """Combinations that could only end without having begun."""
+    interval_s = getattr(parts.trigger, "interval_s", 0.0)
+    if interval_s >= parts.stuck_s:
+        raise ConfigError(f"stuck_s must be > trigger.interval_s = {interval_s}, got {parts.stuck_s}")
+    names = type(parts.mission).__name__, type(parts.explorer).__name__
+    if names == ("Explore", "TargetOnly"):
+        raise ConfigError("mission=explore has no target: it needs explorer=frontier, got target_only")

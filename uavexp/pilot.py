@@ -36,8 +36,7 @@ from uavexp.types import (
     Trajectory,
 )
 
-_GOALS_PER_REQUEST = 3  # so many goals are tried before the vehicle brakes [ours]
-_LOOK_RADPS = 0.8  # [ours]
+_GOALS_FAULT = (PlanStatus.GOAL_BLOCKED, PlanStatus.NO_PATH, PlanStatus.NOT_CLEAR)  # another may do
 _NEAR_M, _CHANGED_M = 2.0, 0.15  # r_mon and delta_map of paper 1
 _SAMPLE_S = 0.1  # spacing of the samples kept of a trajectory
 
@@ -63,6 +62,8 @@ class Pilot:
     latency_s: float
     settle_s: float  # no plan before the map has seen as much
     restart_error_m: float
+    goals_per_request: int  # so many goals are tried before the vehicle brakes
+    look_around_radps: float  # turning while there is no plan
     yaw_lookahead_s: float
     yaw_rate_radps: float  # kept below the body-rate limit: roll and pitch need their share
     flight_bounds_m: Float  # (2, 3)
@@ -113,8 +114,8 @@ class Pilot:
 
     def _look_around(self, step_s: float) -> Reference:
         """Hold and turn: without a plan, only new sights can help."""
-        self.yaw_rad = wrap_angle(self.yaw_rad + _LOOK_RADPS * step_s)
-        return self._hold(self._planned_state(math.inf)[0], _LOOK_RADPS)
+        self.yaw_rad = wrap_angle(self.yaw_rad + self.look_around_radps * step_s)
+        return self._hold(self._planned_state(math.inf)[0], self.look_around_radps)
 
     def _turn(self, ahead_m: Float, step_s: float) -> float:
         """Turn the yaw towards the path ahead; return the rate, rad/s."""
@@ -133,7 +134,7 @@ class Pilot:
         if self.trajectory is None and not self.replans:
             self.request("first", observation)
         elif self.failure and not (self._wait_for_rest and self._moving(observation.time_s)):
-            self.request("retry", observation)
+            self.request("brake" if self._wait_for_rest else "retry", observation)
 
     def decide(self, observation: Observation) -> float:
         """Ask safety and trigger; return the trigger's score."""
@@ -142,7 +143,8 @@ class Pilot:
             self._wait_for_rest = True
         with self.watch.lap("trigger"):
             decision = self.trigger.decide(observation)
-        if decision.replan and self.trajectory is not None and not self._wait_for_rest:
+        # After a failure the pilot tries again by itself, equally often under every policy.
+        if decision.replan and self.trajectory is not None and not self.failure:
             self.request(decision.cause, observation, decision.score, decision.voxel)
         return decision.score
 
@@ -154,7 +156,7 @@ class Pilot:
             self.dropped_triggers += 1
             return
         goal = self._select(observation, fresh=True)
-        for _ in range(_GOALS_PER_REQUEST):
+        for _ in range(self.goals_per_request):
             if goal is None:
                 break
             result = self._plan(observation, goal)
@@ -163,6 +165,8 @@ class Pilot:
                 self._accept(result.trajectory, goal, observation)
                 return
             self.failure = f"{result.status.value}: {result.reason}"
+            if result.status not in _GOALS_FAULT:
+                break
             self.explorer.reject(goal.position_m, observation.time_s)
             goal = self._select(observation, fresh=True)
         if goal is None:
@@ -220,7 +224,7 @@ class Pilot:
         result: PlanResult,
         fired: Int32 | None,
     ) -> None:
-        voxel = fired if fired is not None and len(fired) > 0 else _changed_nearby(observation)
+        voxel = np.zeros(0, dtype=np.int32) if fired is None else fired
         new_m = np.zeros((0, 3))
         change_m, effective_s = math.nan, math.nan
         if result.trajectory is not None:
@@ -241,6 +245,7 @@ class Pilot:
                 path_change_m=change_m,
                 iterations=result.iterations,
                 expansions=result.expansions,
+                near_change=_near_change(observation),
                 changed_m=observation.field.voxel_centres_m(voxel).astype(np.float32),
                 trajectory_m=new_m.astype(np.float32),
             )
@@ -250,8 +255,8 @@ class Pilot:
         return self.trajectory is not None and time_s < self.trajectory.end_s
 
     def _brake(self, time_s: float, reason: str) -> None:
-        """Leave the trajectory and stop; hold where that ends."""
-        self.failure = reason
+        """Leave the trajectory and any plan in flight, and stop; hold where that ends."""
+        self.failure, self._pending = reason, None
         if self._moving(time_s) and not self._stopping():
             position_m, velocity_mps, acceleration_mps2 = self._planned_state(time_s)
             self.trajectory = braking_trajectory(
@@ -285,26 +290,29 @@ def with_stop(trajectory: Trajectory, limits: Limits) -> Trajectory:
     )
 
 
-def _changed_nearby(observation: Observation) -> Int32:
-    """Voxels of this update whose distance shrank by more than delta_map within r_mon of the vehicle.
+def _near_change(observation: Observation) -> bool:
+    """Whether this update brought obstacles nearer, by more than delta_map, within r_mon of vehicle or path.
 
-    What any policy is asked for: how many of its replans lie near a structural change.
+    Asked alike of every policy's replans: how many lie near a structural change.
     """
     update, field_ = observation.update, observation.field
     counted = ~update.first_seen | update.occupied
-    voxel: Int32 = changed_near(
+    points_m = observation.state.position_m[None]
+    if observation.trajectory is not None:
+        points_m = np.concatenate([points_m, _samples(observation.trajectory, observation.time_s)])
+    voxel, _ = changed_near(
         update.voxel[counted],
         update.old_distance_m[counted],
         update.new_distance_m[counted],
         np.array(field_.distance.shape),
         field_.origin_m,
         field_.voxel_size_m,
-        observation.state.position_m[None],
+        points_m,
         _NEAR_M,
         _CHANGED_M,
         False,
-    )[0]
-    return voxel
+    )
+    return len(voxel) > 0
 
 
 def _samples(trajectory: Trajectory, from_s: float) -> Float:

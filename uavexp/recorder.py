@@ -55,11 +55,6 @@ class Recorder:
     ticks: list[tuple[float, float, int, float]] = field(default_factory=list)
     goals_m: list[Float] = field(default_factory=list)
 
-    @property
-    def end_s(self) -> float:
-        """Time of the last row."""
-        return self.steps[-1][0]
-
     def step(self, time_s: float, state: State, estimate: State, reference: Reference) -> None:
         """Add the row of one simulation step."""
         self.steps.append(

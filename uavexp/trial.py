@@ -52,6 +52,8 @@ class Parts:
     settle_s: float = 0.5
     restart_error_m: float = 0.4
     stuck_s: float = 20.0
+    goals_per_request: int = 3
+    look_around_radps: float = 0.8
     yaw_lookahead_s: float = 0.8
 
     def __post_init__(self) -> None:
@@ -62,10 +64,15 @@ class Parts:
             settle_s=self.settle_s,
             restart_error_m=self.restart_error_m,
             yaw_lookahead_s=self.yaw_lookahead_s,
+            look_around_radps=self.look_around_radps,
         )
+        require(self.goals_per_request >= 1, f"goals_per_request must be >= 1, got {self.goals_per_request}")
         steps_per(self.step_s, "latency_s", self.latency_s)
         for name, rate_hz in self.rates_hz().items():
-            steps_per(self.step_s, f"1 / {name}", 1.0 / rate_hz)
+            steps = steps_per(self.step_s, f"1 / {name}", 1.0 / rate_hz)
+            require(
+                steps >= 1, f"{name} must be at most 1 / step_s = {1.0 / self.step_s:g} Hz, got {rate_hz:g}"
+            )
 
     def rates_hz(self) -> dict[str, float]:
         """The rates of all roles that have one."""
@@ -139,6 +146,8 @@ def fly(parts: Parts, world: World, seed: int, progress: Progress | None = None)
         outcome = parts.mission.outcome(state.position_m, observation)
         if outcome is None and step % 100 == 0 and recorder.moved_m(stuck_steps) < 0.3:
             outcome = Outcome.STUCK if pilot.ever_planned else Outcome.NO_PLAN
+        if outcome is Outcome.EXPLORED and not pilot.ever_planned:
+            outcome = Outcome.NO_PLAN
         if outcome is not None:
             break
         with watch.lap("vehicle"):
@@ -185,6 +194,8 @@ def _reset(parts: Parts, world: World, scene: Scene, start: State, seed: int, wa
         latency_s=parts.latency_s,
         settle_s=parts.settle_s,
         restart_error_m=parts.restart_error_m,
+        goals_per_request=parts.goals_per_request,
+        look_around_radps=parts.look_around_radps,
         yaw_lookahead_s=parts.yaw_lookahead_s,
         yaw_rate_radps=0.9 * limits.max_body_rate_radps,
         flight_bounds_m=world.flight_bounds_m,
@@ -223,7 +234,7 @@ def _log(
     exploring = parts.mission.target_m is None
     return recorder.log(
         outcome=outcome,
-        reason="" if outcome in (Outcome.REACHED, Outcome.EXPLORED) else pilot.failure,
+        reason=_reason(parts, pilot, outcome),
         step_s=parts.step_s,
         scene=scene,
         field=parts.mapping.field,
@@ -235,3 +246,12 @@ def _log(
         else math.nan,
         watch=watch,
     )
+
+
+def _reason(parts: Parts, pilot: Pilot, outcome: Outcome) -> str:
+    if outcome in (Outcome.REACHED, Outcome.EXPLORED):
+        return ""
+    if outcome is Outcome.TIMEOUT:
+        return f"not there after {parts.mission.time_limit_s:g} s"
+    still = f"has not moved for {parts.stuck_s:g} s"
+    return f"{still}; {pilot.failure}" if pilot.failure else f"{still}, and nothing asked for a new plan"

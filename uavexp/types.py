@@ -120,14 +120,6 @@ class Trajectory:
         return self.end_s - self.start_s
 
 
-class CellState(StrEnum):
-    """Classes of a map cell; stored as 0, 1, 2 (`mapping.base`)."""
-
-    UNKNOWN = "unknown"
-    FREE = "free"
-    OCCUPIED = "occupied"
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scan:
     """One depth image with the pose it is believed to be taken from.
@@ -179,7 +171,6 @@ class Goal:
     position_m: Float  # (3,)
     is_target: bool  # the mission's target itself (arrive at rest) or a frontier
     score: float  # the explorer's, higher is better
-    heading_rad: float = 0.0  # direction of the path at the goal, from the explorer's search
 
 
 class PlanStatus(StrEnum):
@@ -316,7 +307,8 @@ class Replan:
     path_change_m: float  # largest distance of the old remaining path from the new one; NaN if none
     iterations: int
     expansions: int
-    changed_m: Float32  # (N, 3) voxel centres whose change fired it (figure 10); other causes: changed nearby
+    near_change: bool  # whether the map was changing near vehicle or path (`pilot`), whatever the cause
+    changed_m: Float32  # (N, 3) voxel centres whose change fired it (figure 10); may be empty
     trajectory_m: Float32  # (P, 3) samples of the new trajectory (drawn in pictures); may be empty
 
 

@@ -12,7 +12,6 @@ from scipy.sparse.csgraph import dijkstra
 from uavexp.explorer.planar import (
     connected_components,
     density_clusters,
-    descend,
     frontier_cells,
     path_lengths,
     split_long,
@@ -49,17 +48,6 @@ def test_path_lengths_equal_scipys(seed: int) -> None:
     cost = rng.integers(100, 500, passable.shape).astype(np.int32)
     lengths = path_lengths(passable, cost, (3, 4))
     np.testing.assert_allclose(lengths, scipy_lengths(passable, cost, (3, 4)) / 100, rtol=1e-5)
-
-
-def test_descent_follows_the_shortest_path_home() -> None:
-    passable = np.ones((9, 9), dtype=bool)
-    passable[4, :8] = False
-    lengths = path_lengths(passable, np.full((9, 9), 100, dtype=np.int32), (0, 0))
-    path = descend(lengths, (8, 0))
-    assert tuple(path[0]) == (8, 0)
-    assert tuple(path[-1]) == (0, 0)
-    assert (np.abs(np.diff(path, axis=0)).max(axis=1) == 1).all()
-    assert passable[tuple(path.T)].all()
 
 
 def test_frontier_is_free_beside_unknown() -> None:

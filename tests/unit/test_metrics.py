@@ -202,15 +202,13 @@ class TestReplans:
         assert self.evaluate(*self.REPLANS)["useful_replans"] == 2
         assert self.evaluate(*self.REPLANS, useful_change_m=0.4)["useful_replans"] == 1
 
-    def test_share_near_a_change_looks_at_the_vehicle_and_the_new_plan(self):
-        voxel = np.array([[10.0, 0.0, 0.0]], dtype=np.float32)
-        path = np.array([[0.0, 0.0, 0.0], [9.0, 1.0, 0.0]], dtype=np.float32)
+    def test_share_near_a_change_leaves_the_first_plan_out(self):
         values = self.evaluate(
-            make_replan(0.0, "first"),
-            make_replan(1.0, "map", changed_m=voxel, position_m=np.array([9.0, 0.0, 0.0])),  # at the vehicle
-            make_replan(2.0, "map", changed_m=voxel, trajectory_m=path),  # at the plan
-            make_replan(3.0, "map", changed_m=voxel),  # 10 m away
-            make_replan(4.0, "clock"),  # names no change
+            make_replan(0.0, "first", near_change=True),
+            make_replan(1.0, "map", near_change=True),
+            make_replan(2.0, "clock", near_change=True),
+            make_replan(3.0, "goal"),
+            make_replan(4.0, "clock"),
         )
         assert values["replans_near_change_share"] == 0.5
 

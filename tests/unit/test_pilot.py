@@ -18,6 +18,7 @@ from uavexp.planner.min_acc import MinAcc
 from uavexp.recorder import Stopwatch
 from uavexp.safety.brake import Brake
 from uavexp.safety.none import NoBrake
+from uavexp.trigger.mcr import Mcr
 from uavexp.trigger.ssp import Ssp
 from uavexp.trigger.tbr import Tbr
 from uavexp.types import Observation, PlanStatus, Reference, State, Trajectory
@@ -33,7 +34,7 @@ def room(*, walled: bool = False) -> DistanceField:
     return field_from(grid)
 
 
-def make(trigger: Tbr | Ssp, safety: NoBrake | Brake | None = None) -> Pilot:
+def make(trigger: Tbr | Ssp | Mcr, safety: NoBrake | Brake | None = None, latency_s: float = 0.03) -> Pilot:
     planner, explorer, safety = MinAcc(), TargetOnly(), safety or NoBrake()
     planner.reset(LIMITS, np.random.default_rng(0))
     explorer.reset(1.0, LIMITS)
@@ -46,9 +47,11 @@ def make(trigger: Tbr | Ssp, safety: NoBrake | Brake | None = None) -> Pilot:
         safety=safety,
         limits=LIMITS,
         watch=Stopwatch(),
-        latency_s=0.03,
+        latency_s=latency_s,
         settle_s=0.0,
         restart_error_m=0.4,
+        goals_per_request=3,
+        look_around_radps=0.8,
         yaw_lookahead_s=0.8,
         yaw_rate_radps=1.8,
         flight_bounds_m=BOUNDS,
@@ -133,6 +136,22 @@ def test_safety_stops_before_the_wall_that_single_shot_would_fly_into() -> None:
         pilot = make(Ssp(), safety)
         positions = fly(pilot, {0.0: room(), 1.5: room(walled=True)}, 8.0)
         assert bool(positions[:, 0].max() < 6.0 - LIMITS.body_radius_m) is stops
+
+
+def test_a_plan_in_flight_does_not_undo_the_brake() -> None:
+    """It used to be adopted after the brake had fired, and flew on through the wall."""
+    pilot = make(Tbr(interval_s=2.0), Brake(stop_at_unknown=False), latency_s=0.2)
+    positions = fly(pilot, {0.0: room(), 2.05: room(walled=True)}, 8.0)
+    assert positions[:, 0].max() < 6.0 - LIMITS.body_radius_m
+
+
+def test_after_a_failure_every_policy_gets_the_same_number_of_tries() -> None:
+    tries = set()
+    for trigger in (Tbr(interval_s=1.0), Mcr()):
+        pilot = make(trigger)
+        fly(pilot, {0.0: room(), 1.95: room(walled=True)}, 6.0)
+        tries.add(sum(replan.time_s > 3.0 for replan in pilot.replans))
+    assert len(tries) == 1
 
 
 def test_a_moving_end_is_followed_by_a_stop() -> None:

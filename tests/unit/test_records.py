@@ -48,6 +48,7 @@ def replan(time_s: float, changed: int) -> Replan:
         path_change_m=0.25,
         iterations=3,
         expansions=100,
+        near_change=bool(changed % 2),
         changed_m=np.full((changed, 3), time_s, dtype=np.float32),
         trajectory_m=np.zeros((2 * changed, 3), dtype=np.float32),
     )

@@ -11,6 +11,7 @@ from tests.fields import box, empty, field_from
 from tests.unit.test_trigger import LIMITS, STRAIGHT, change, observe
 from uavexp.geometry import evaluate
 from uavexp.mapping.base import UNKNOWN, DistanceField
+from uavexp.planner.brake import stopping_distance_m
 from uavexp.safety.brake import Brake
 from uavexp.safety.none import NoBrake
 from uavexp.types import Limits, Observation, Reference
@@ -45,14 +46,14 @@ def first_brake_m(brake: Brake, field: DistanceField) -> float:
 def test_brakes_before_a_wall_with_room_to_stop_and_not_earlier() -> None:
     wall_m = 4.0
     brake = Brake(margin_m=0.05, reaction_s=0.2, stop_at_unknown=False)
-    ahead_m = 1.0 / (2 * 2.5) + 0.2 + LIMITS.body_radius_m
+    ahead_m = stopping_distance_m(1.0, LIMITS) + 0.2 + LIMITS.body_radius_m
     contact_m = wall_m - LIMITS.body_radius_m - 0.05
     assert first_brake_m(brake, walled(wall_m)) == pytest.approx(contact_m - ahead_m, abs=0.12)
 
 
 def test_brakes_before_unknown_space_only_when_asked() -> None:
     field = walled(4.0, unknown=True)
-    ahead_m = 1.0 / (2 * 2.5) + 0.2 + LIMITS.body_radius_m
+    ahead_m = stopping_distance_m(1.0, LIMITS) + 0.2 + LIMITS.body_radius_m
     assert first_brake_m(Brake(stop_at_unknown=True), field) == pytest.approx(4.0 - ahead_m, abs=0.12)
     assert first_brake_m(Brake(stop_at_unknown=False), field) == float("inf")
 

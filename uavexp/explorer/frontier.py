@@ -34,7 +34,6 @@ from uavexp.explorer.planar import (
     UNKNOWN,
     connected_components,
     density_clusters,
-    descend,
     frontier_cells,
     path_lengths,
     split_long,
@@ -96,6 +95,7 @@ class Frontier:
     min_clearance_m: float = 0.3  # d_min
     enough_clearance_m: float = 0.6
     cell_m: float = 0.15
+    occupied_below_m: float = 0.3
     unknown: Unknown = Unknown.OPTIMISTIC
     unknown_cost: float = 1.5
     band_below_m: float = 0.2
@@ -122,6 +122,7 @@ class Frontier:
             ascent_step_m=self.ascent_step_m,
             min_clearance_m=self.min_clearance_m,
             cell_m=self.cell_m,
+            occupied_below_m=self.occupied_below_m,
             visited_m=self.visited_m,
             escape_m=self.escape_m,
         )
@@ -167,7 +168,7 @@ class Frontier:
         kept = self._kept(search, observation)
         bonus = 0.0 if fresh else self.hysteresis
         # Information is left out of `kept`: what that goal promised is being seen on the way.
-        if kept is None or (best is not None and best.score >= kept.score + bonus):
+        if kept is None or (best is not None and (best.is_target or best.score >= kept.score + bonus)):
             self._current = best
         return self._current
 
@@ -192,7 +193,7 @@ class Frontier:
             z_max_m=self._height_m + self.band_above_m,
             flight_height_m=self._height_m,
             cell_m=self.cell_m,
-            occupied_below_m=self.min_clearance_m,
+            occupied_below_m=self.occupied_below_m,
         )
         inside = _inside(planar, observation.flight_bounds_m)
         clear = inside & (planar.clearance > self.min_clearance_m)
@@ -278,12 +279,7 @@ class Frontier:
         if info:
             radius = self.neighbourhood_m / self.cell_m
             score += self.alpha * unknown_within(search.planar.state, search.inside, cell, radius)
-        return Goal(
-            position_m=point_m,
-            is_target=False,
-            score=score,
-            heading_rad=_arrival_heading(search.from_vehicle, cell),
-        )
+        return Goal(position_m=point_m, is_target=False, score=score)
 
     def _is_aside(self, point_m: Float) -> bool:
         return any(float(np.linalg.norm(point_m - other)) < self.visited_m for _, other in self._aside)
@@ -303,10 +299,3 @@ def _within(planar: PlanarMap, cell: tuple[int, int], radius_m: float) -> Bool:
     i, j = np.ogrid[: planar.state.shape[0], : planar.state.shape[1]]
     near: Bool = (i - cell[0]) ** 2 + (j - cell[1]) ** 2 <= (radius_m / planar.cell_m) ** 2
     return near
-
-
-def _arrival_heading(from_vehicle: Float32, cell: tuple[int, int]) -> float:
-    """Direction of the last half dozen cells of the path to `cell`, rad."""
-    path = descend(from_vehicle, cell)
-    back = path[min(6, len(path) - 1)]
-    return math.atan2(cell[1] - float(back[1]), cell[0] - float(back[0]))

@@ -88,26 +88,6 @@ def path_lengths(passable: Bool, cost: Int32, source: tuple[int, int]) -> Float3
 
 
 @nb.njit(cache=True)
-def descend(length: Float32, cell: tuple[int, int]) -> Int32:
-    """Cells (P, 2) of a shortest path from `cell` down to the source of `path_lengths`."""
-    nx, ny = length.shape
-    path = np.empty((nx * ny, 2), dtype=np.int32)
-    i, j = cell
-    count = 0
-    while True:
-        path[count] = i, j
-        count += 1
-        best, bi, bj = length[i, j], i, j
-        for n in range(8):
-            a, b = i + _OFFSETS[n, 0], j + _OFFSETS[n, 1]
-            if 0 <= a < nx and 0 <= b < ny and length[a, b] < best:
-                best, bi, bj = length[a, b], a, b
-        if (bi == i and bj == j) or count == nx * ny:
-            return path[:count].copy()
-        i, j = bi, bj
-
-
-@nb.njit(cache=True)
 def frontier_cells(state: UInt8, inside: Bool) -> Bool:
     """Frontier (X, Y): free cells with an unknown 8-neighbour, both inside the flight bounds."""
     nx, ny = state.shape

@@ -11,8 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
 from uavexp.types import PlanStatus, Replan, TrialLog
 
 CAUSES = ("map", "goal", "clock")  # counted by name; every other cause is "other"
@@ -43,23 +41,12 @@ def count_useful(replans: Sequence[Replan], useful_change_m: float) -> int:
     return sum(replan.path_change_m > useful_change_m for replan in replans)
 
 
-def share_near_change(replans: Sequence[Replan], near_m: float) -> float:
-    """Share of replans with a changed voxel within `near_m` of the vehicle or its new plan.
+def share_near_change(replans: Sequence[Replan]) -> float:
+    """Share of replans made while the map was changing near the vehicle or its path [ours].
 
-    [ours] The reading of "replans near a structural change": 1 means that the map was
-    changing there every time, whatever the policy's cause. NaN without replans.
+    NaN without replans.
     """
-    if not replans:
-        return float("nan")
-    return sum(_is_near_change(replan, near_m) for replan in replans) / len(replans)
-
-
-def _is_near_change(replan: Replan, near_m: float) -> bool:
-    if replan.changed_m.shape[0] == 0:
-        return False
-    places = np.concatenate([replan.position_m[None, :], replan.trajectory_m.reshape(-1, 3)])
-    nearest_m2 = min(float(np.sum((replan.changed_m - place) ** 2, axis=1).min()) for place in places)
-    return nearest_m2 <= near_m**2
+    return sum(replan.near_change for replan in replans) / len(replans) if replans else float("nan")
 
 
 def rate(count: int, extent: float) -> float:

@@ -16,7 +16,6 @@ def evaluate(
     *,
     safety_threshold_m: float = 0.30,
     useful_change_m: float = 0.10,
-    near_change_m: float = 2.0,
 ) -> Metrics:
     """Return every metric of a flight; recomputable from a stored log without flying.
 
@@ -26,8 +25,6 @@ def evaluate(
         safety_threshold_m: clearance under which time counts as unsafe, m ([ours]: MCR's mean
             smallest clearance in Chen et al. 2026 is 0.31 m).
         useful_change_m: departure from the old plan from which a replan was useful, m [ours].
-        near_change_m: how near a map change must be to belong to a replan, m (the
-            monitoring radius of Chen et al. 2026).
 
     Returns:
         One plain value per name, units in the names. NaN says that a figure does not exist
@@ -38,7 +35,7 @@ def evaluate(
         "success": log.outcome in ARRIVED and not log.contacts,
         **_path(log, world),
         **_clearance(log, safety_threshold_m),
-        **_replanning(log, useful_change_m, near_change_m),
+        **_replanning(log, useful_change_m),
         **_tracking(log),
         **_smoothness(log),
         "seen_share": float(log.seen_share),
@@ -71,7 +68,7 @@ def _clearance(log: TrialLog, safety_threshold_m: float) -> Metrics:
     }
 
 
-def _replanning(log: TrialLog, useful_change_m: float, near_change_m: float) -> Metrics:
+def _replanning(log: TrialLog, useful_change_m: float) -> Metrics:
     replans = replanning.executed(log)
     counts = replanning.count_by_cause(replans)
     return {
@@ -82,7 +79,7 @@ def _replanning(log: TrialLog, useful_change_m: float, near_change_m: float) -> 
         "dropped_triggers": log.dropped_triggers,
         "replans_per_m": replanning.rate(len(replans), path.path_length_m(log)),
         "replans_per_s": replanning.rate(len(replans), path.completion_time_s(log)),
-        "replans_near_change_share": replanning.share_near_change(replans, near_change_m),
+        "replans_near_change_share": replanning.share_near_change(replans),
     }
 
 

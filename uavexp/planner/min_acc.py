@@ -29,7 +29,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from uavexp.errors import require, require_non_negative, require_positive
-from uavexp.geometry import evaluate, sample_times
+from uavexp.geometry import GRAVITY_MPS2, evaluate, sample_times
 from uavexp.planner.brake import braking_trajectory
 from uavexp.planner.optimise import CONTROL_POINTS, Settings, optimise, shortfall
 from uavexp.planner.search import PathSearch
@@ -114,6 +114,7 @@ class MinAcc:
             known_only=self.unknown == "conservative",
             max_speed=limits.max_speed_mps,
             max_acceleration=limits.max_acceleration_mps2,
+            max_jerk=GRAVITY_MPS2 * limits.max_body_rate_radps,
         )
         self._search = PathSearch(
             min_clearance_m=self.min_clearance_m,

@@ -71,6 +71,7 @@ class Settings(NamedTuple):
     known_only: bool
     max_speed: float
     max_acceleration: float
+    max_jerk: float  # of the stop that follows a moving end
 
 
 class Problem(NamedTuple):
@@ -159,7 +160,9 @@ def _end_velocity(problem: Problem, settings: Settings) -> Float:
     along /= length
     travel = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
     reachable = float(problem.start[1] @ problem.start[1]) + settings.max_acceleration * travel
-    stop_m = settings.end_speed**2 / (2.0 * settings.max_acceleration)
+    # Stop as flown: jerk-limited, v²/(2a) + v a/(2j) (`brake`)
+    ramp = settings.max_acceleration / (2.0 * settings.max_jerk)
+    stop_m = settings.end_speed**2 / (2.0 * settings.max_acceleration) + settings.end_speed * ramp
     ahead = np.arange(1, math.ceil(stop_m / STEP_M) + 1) * STEP_M
     beyond = goal + ahead[:, None] * along
     free = problem.field.distance_m(beyond) >= settings.min_clearance
@@ -167,8 +170,10 @@ def _end_velocity(problem: Problem, settings: Settings) -> Float:
     if settings.known_only:
         free &= problem.field.observed(beyond)
     room = ahead[-1] if free.all() else ahead[np.argmin(free)] - STEP_M
-    square = min(settings.end_speed**2, reachable, 2.0 * settings.max_acceleration * room)
-    velocity: Float = math.sqrt(square) * along
+    stoppable = settings.max_acceleration * (
+        math.sqrt(ramp**2 + 2.0 * room / settings.max_acceleration) - ramp
+    )
+    velocity: Float = min(settings.end_speed, math.sqrt(reachable), stoppable) * along
     return velocity
 
 

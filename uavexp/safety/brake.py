@@ -8,6 +8,7 @@ import numpy as np
 
 from uavexp.errors import require, require_non_negative
 from uavexp.geometry import evaluate, sample_times
+from uavexp.planner.brake import stopping_distance_m
 from uavexp.types import Limits, Observation
 
 _SAMPLE_S = 0.04  # at 2.5 m/s one voxel apart
@@ -17,7 +18,7 @@ _SAMPLE_S = 0.04  # at 2.5 m/s one voxel apart
 class Brake:
     """Brakes when the path within the stopping distance ahead is not known to be free."""
 
-    margin_m: float = 0.05
+    margin_m: float = 0.03
     reaction_s: float = 0.2
     stop_at_unknown: bool = True
     _limits: Limits | None = field(init=False, repr=False, default=None)
@@ -33,7 +34,7 @@ class Brake:
     def must_brake(self, observation: Observation) -> bool:
         """Whether the trajectory, up to the stopping distance ahead, is blocked or unknown.
 
-        The look-ahead distance is v²/(2a), plus what is flown in `reaction_s` (one ESDF
+        The look-ahead distance is the stopping distance, plus what is flown in `reaction_s` (one ESDF
         period and the latency), plus the body's radius.
         """
         limits, trajectory = self._limits, observation.trajectory
@@ -44,14 +45,12 @@ class Brake:
         speed_mps = float(np.linalg.norm(observation.reference.velocity_mps))
         if speed_mps < 0.05 or len(points_m) < 2:
             return False
-        ahead_m = (
-            speed_mps * speed_mps / (2.0 * limits.max_acceleration_mps2)
-            + speed_mps * self.reaction_s
-            + limits.body_radius_m
-        )
+        ahead_m = stopping_distance_m(speed_mps, limits) + speed_mps * self.reaction_s + limits.body_radius_m
         along_m = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points_m, axis=0), axis=1)))
         near = points_m[along_m <= ahead_m]
-        blocked = observation.field.distance_m(near) < limits.body_radius_m + self.margin_m
+        clearance_m = observation.field.distance_m(near)
+        # Getting away from what is near already is no danger.
+        blocked = (clearance_m < limits.body_radius_m + self.margin_m) & (clearance_m < clearance_m[0] - 0.01)
         if self.stop_at_unknown:
             blocked |= ~observation.field.observed(near)
         return bool(blocked.any())
