@@ -28,7 +28,7 @@ STRATEGIES: dict[str, list[str]] = {
 }
 # explorer=target_only is the second table: what SSP flies, and the cleanest comparison of triggers
 CELLS = [("frontier", name) for name in STRATEGIES if name != "SSP"] + [
-    ("target_only", name) for name in ("SSP", "MCR", "TBR 0.5 s", "TBR 1 s", "TBR 2 s")
+    ("target_only", name) for name in ("SSP", "MCR", "TBR 1 s")
 ]
 COLUMNS = {
     "success %": lambda rows: f"{100 * rows.success.mean():.0f} {wilson(int(rows.success.sum()), len(rows))}",

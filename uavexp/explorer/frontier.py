@@ -103,7 +103,7 @@ class Frontier:
     min_distance_m: float = 0.8
     commit_m: float = 0.8
     hysteresis: float = 2.0
-    visited_m: float = 0.5
+    aside_radius_m: float = 0.3
     escape_m: float = 0.6
     set_aside_s: float = 10.0
     _height_m: float = field(init=False, repr=False, default=0.0)
@@ -123,7 +123,7 @@ class Frontier:
             min_clearance_m=self.min_clearance_m,
             cell_m=self.cell_m,
             occupied_below_m=self.occupied_below_m,
-            visited_m=self.visited_m,
+            aside_radius_m=self.aside_radius_m,
             escape_m=self.escape_m,
         )
         require_non_negative(
@@ -180,9 +180,10 @@ class Frontier:
         distance_m = float(np.linalg.norm(goal.position_m - position_m))
         if goal.is_target:
             return self._target(search, observation)
-        if distance_m < self.visited_m:
+        if distance_m <= self.commit_m:
+            # Visited. A frontier that is still there a few steps on cannot be seen from here.
             self._aside.append((observation.time_s + self.set_aside_s, goal.position_m))
-        if distance_m <= self.commit_m or self._is_aside(goal.position_m):
+        if self._is_aside(goal.position_m):
             return None
         return self._score(search, goal.position_m, observation.field)
 
@@ -282,7 +283,7 @@ class Frontier:
         return Goal(position_m=point_m, is_target=False, score=score)
 
     def _is_aside(self, point_m: Float) -> bool:
-        return any(float(np.linalg.norm(point_m - other)) < self.visited_m for _, other in self._aside)
+        return any(float(np.linalg.norm(point_m - other)) < self.aside_radius_m for _, other in self._aside)
 
 
 def _inside(planar: PlanarMap, bounds_m: Float) -> Bool:
