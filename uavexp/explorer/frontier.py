@@ -15,7 +15,8 @@ shortest wins, information breaking ties. When the target itself is reachable ov
 known-free cells, the goal is the target.
 
 Left to us by the paper, and [ours] here: splitting long clusters (the centroid of a long
-curved frontier lies off it), setting visited or rejected goals aside, and persistence: a
+curved frontier lies off it), setting visited or rejected goals aside, the target through
+unknown space as last resort when no frontier is left, and persistence: a
 goal is kept until it is nearer than `commit_m`, no longer reachable, or beaten by more
 than `hysteresis`. Without it g* recedes with every scan, and "goal drift" means nothing.
 """
@@ -169,8 +170,15 @@ class Frontier:
         bonus = 0.0 if fresh else self.hysteresis
         # Information is left out of `kept`: what that goal promised is being seen on the way.
         if kept is None or (best is not None and (best.is_target or best.score >= kept.score + bonus)):
-            self._current = best
+            self._current = best or self._last_resort(observation)
         return self._current
+
+    def _last_resort(self, observation: Observation) -> Goal | None:
+        """The target through unknown space when no frontier is left; the planner searches in 3D."""
+        target_m = observation.target_m
+        if target_m is None or self.unknown is Unknown.CONSERVATIVE or self._is_aside(target_m):
+            return None
+        return Goal(position_m=target_m, is_target=True, score=-math.inf)
 
     def _kept(self, search: _Search, observation: Observation) -> Goal | None:
         """Score the current goal anew; None when it is near, set aside or not reachable any more."""
