@@ -29,6 +29,7 @@ _START_EXCESS = 1.1  # a start beyond a limit by more than this factor is refuse
 _QP_SHARE = 0.96  # of the limits inside the QP: room for its linearisation
 _STRETCH = 1.06  # least factor by which a duration is stretched
 _STRETCH_GAIN = 0.99  # stretching ends unless it takes the excess below this share
+_SHORTEST_S = 0.2  # of a trajectory to where the vehicle is: h² of a shorter one drowns in rounding
 _RETIME = 0.03  # relative change of duration that is worth placing the control points anew
 _HARD_ABOVE_VOXELS = 0.5  # the steep part of the obstacle cost begins this far above the hard limit
 _START_SLACK_M = 0.01  # by which a start below the hard limit may come closer still
@@ -226,6 +227,7 @@ class _Shaper:
         count = self.model.control_points
         fastest = float(times[-1])
         duration = (fastest + late_s) * self.settings.duration_margin * self.rung.slower
+        duration = max(duration, _SHORTEST_S)
         h = duration / (count - 3)
         control = place_by_time(points, times, count, h, duration / fastest)
         pin_ends(control, h, self.problem.start, self.problem.end)
