@@ -65,10 +65,9 @@ class _Search:
 
     planar: PlanarMap
     inside: Bool  # (X, Y) cells within the flight bounds
-    known: Float32  # (X, Y) path length from the vehicle over known-free cells, in cells
     from_vehicle: Float32  # (X, Y) path cost from the vehicle, over unknown cells too if optimistic
     from_target: Float32 | None  # (X, Y) with unknown as free, in cells
-    target_cell: tuple[int, int] | None
+    target_known: bool  # whether known-free cells lead from the vehicle to the target
 
     def cost_m(self, cell: tuple[int, int]) -> float:
         return float(self.from_vehicle[cell]) * self.planar.cell_m
@@ -210,24 +209,26 @@ class Frontier:
         vehicle = planar.cell_of(observation.state.position_m)
         # Nearer to an obstacle than d_min, the vehicle must still find its way out.
         clear |= inside & (planar.clearance > 0.0) & _within(planar, vehicle, self.escape_m)
-        known = from_vehicle = path_lengths(clear & (planar.state == FREE), unit, vehicle)
+        known = clear & (planar.state == FREE)
         if self.unknown is Unknown.OPTIMISTIC:
             dear = np.int32(round(100 * self.unknown_cost))
             cost = np.where(planar.state == UNKNOWN, dear, unit)
             from_vehicle = path_lengths(clear, cost, vehicle)
+        else:
+            from_vehicle = path_lengths(known, unit, vehicle)
         if observation.target_m is None:
-            return _Search(planar, inside, known, from_vehicle, None, None)
+            return _Search(planar, inside, from_vehicle, None, False)
         target = planar.cell_of(observation.target_m)
-        return _Search(planar, inside, known, from_vehicle, path_lengths(clear, unit, target), target)
+        target_known = bool(known[target]) and bool(np.isfinite(path_lengths(known, unit, vehicle)[target]))
+        return _Search(planar, inside, from_vehicle, path_lengths(clear, unit, target), target_known)
 
     def _target(self, search: _Search, observation: Observation) -> Goal | None:
         """The mission's target as a goal, None unless known-free cells lead there."""
-        target_m, cell = observation.target_m, search.target_cell
-        if target_m is None or cell is None or self._is_aside(target_m):
+        target_m = observation.target_m
+        if target_m is None or not search.target_known or self._is_aside(target_m):
             return None
-        if not np.isfinite(search.known[cell]):
-            return None
-        return Goal(position_m=target_m, is_target=True, score=-self.beta * search.cost_m(cell))
+        cost_m = search.cost_m(search.planar.cell_of(target_m))
+        return Goal(position_m=target_m, is_target=True, score=-self.beta * cost_m)
 
     def _best_candidate(self, search: _Search, observation: Observation) -> Goal | None:
         candidates = [
