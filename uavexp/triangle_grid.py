@@ -151,11 +151,8 @@ def box_meets_mesh(grid: TriangleGrid, centre: Float, rotation: Float, half: Flo
             + abs(rotation[axis, 2]) * half[2]
         )
         low[axis], high[axis] = centre[axis] - reach, centre[axis] + reach
-        if (
-            high[axis] < grid.origin_m[axis]
-            or low[axis] > grid.origin_m[axis] + grid.shape[axis] * grid.cell_m
-        ):
-            return False
+    if _is_outside(grid, low, high):
+        return False
     for i in _cells(grid, low, high, 0):
         for j in _cells(grid, low, high, 1):
             for k in _cells(grid, low, high, 2):
@@ -172,12 +169,8 @@ def ball_meets_mesh(grid: TriangleGrid, centre: Float, radius: float) -> bool:
     """Whether some triangle comes nearer to the centre (3,) than `radius`."""
     low = centre - radius
     high = centre + radius
-    for axis in range(3):
-        if (
-            high[axis] < grid.origin_m[axis]
-            or low[axis] > grid.origin_m[axis] + grid.shape[axis] * grid.cell_m
-        ):
-            return False
+    if _is_outside(grid, low, high):
+        return False
     for i in _cells(grid, low, high, 0):
         for j in _cells(grid, low, high, 1):
             for k in _cells(grid, low, high, 2):
@@ -198,6 +191,18 @@ def _cells(grid: TriangleGrid, low: Float, high: Float, axis: int) -> range:
     first = _cell_of(low[axis], grid.origin_m[axis], grid.cell_m, grid.shape[axis])
     last = _cell_of(high[axis], grid.origin_m[axis], grid.cell_m, grid.shape[axis])
     return range(first, last + 1)
+
+
+@nb.njit(cache=True, inline="always")
+def _is_outside(grid: TriangleGrid, low: Float, high: Float) -> bool:
+    """Whether the box from `low` to `high`, each (3,), lies apart from the whole grid."""
+    for axis in range(3):
+        if (
+            high[axis] < grid.origin_m[axis]
+            or low[axis] > grid.origin_m[axis] + grid.shape[axis] * grid.cell_m
+        ):
+            return True
+    return False
 
 
 @nb.njit(cache=True)
