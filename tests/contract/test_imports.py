@@ -17,7 +17,7 @@ LAYERS = (
     {"types", "kernel_cache", "__init__"},
     {"seeding", "geometry", "o3d", "triangle_grid", "scene", "paths"},
     {"roles", "metrics"},
-    {"recorder", "pilot", "trial", "parameters", "trust", "records", "logs", "table"},
+    {"recorder", "pilot", "trial", "parameters", "trust", "records", "logs", "table", "worlds", "study"},
     {"sweep", "report"},
     {"build"},
     {"cli", "__main__"},
