@@ -33,7 +33,8 @@ GROUPS = (
     "safety",
     "mission",
 )
-TOP_LEVEL = {
+TOP_LEVEL: dict[str, Any] = {
+    "world_seed": int | None,
     "step_s": float,
     "latency_s": float,
     "start_bubble_m": float,

@@ -17,6 +17,11 @@ def conf_folder() -> Path:
     raise ConfigError(f"no configuration found: neither {PACKAGE / 'conf'} nor {PACKAGE.parent / 'conf'}")
 
 
+def experiments_folder() -> Path:
+    """Folder of the shipped experiments, beside `conf` in a checkout and in a wheel."""
+    return conf_folder().parent / "experiments"
+
+
 def checkout_root() -> Path | None:
     """Root of the source checkout, or None when the package is installed."""
     return PACKAGE.parent if conf_folder() == PACKAGE.parent / "conf" else None

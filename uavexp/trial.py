@@ -46,6 +46,7 @@ class Parts:
     vehicle: Vehicle
     safety: Safety
     mission: Mission
+    world_seed: int | None = None  # of the layout alone; None: the trial's seed
     step_s: float = 0.01
     latency_s: float = 0.03
     start_bubble_m: float = 0.6
@@ -65,6 +66,9 @@ class Parts:
             restart_error_m=self.restart_error_m,
             yaw_lookahead_s=self.yaw_lookahead_s,
             look_around_radps=self.look_around_radps,
+        )
+        require(
+            self.world_seed is None or self.world_seed >= 0, f"world_seed must be >= 0, got {self.world_seed}"
         )
         require(self.goals_per_request >= 1, f"goals_per_request must be >= 1, got {self.goals_per_request}")
         steps_per(self.step_s, "latency_s", self.latency_s)
@@ -93,7 +97,7 @@ def steps_per(step_s: float, name: str, duration_s: float) -> int:
 
 
 def fly_trial(parts: Parts, seed: int, progress: Progress | None = None) -> tuple[World, TrialLog]:
-    """Draw the seed's world and fly one trial in it.
+    """Draw the seed's world (that of `world_seed`, if set) and fly one trial in it.
 
     Args:
         parts: freshly built components.
@@ -106,7 +110,8 @@ def fly_trial(parts: Parts, seed: int, progress: Progress | None = None) -> tupl
     Raises:
         WorldError: when the world cannot be made.
     """
-    world = parts.world.generate(generator(seed, Stream.WORLD))
+    layout = seed if parts.world_seed is None else parts.world_seed
+    world = parts.world.generate(generator(layout, Stream.WORLD))
     return world, fly(parts, world, seed, progress)
 
 

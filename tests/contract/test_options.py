@@ -24,7 +24,7 @@ from uavexp.build import (
     protocol_of,
 )
 from uavexp.cli.composition import Composer
-from uavexp.cli.options import PRESET_GROUP, read_option
+from uavexp.cli.options import PRESET_GROUP, RUNNER_GROUP, read_option
 from uavexp.cli.overrides import Setting, parse_settings
 from uavexp.parameters import MISSING, check_value, parameter_types, plain, required_parameters
 from uavexp.paths import PACKAGE, conf_folder
@@ -51,7 +51,7 @@ def values(tree: dict[str, object]) -> dict[str, object]:
 
 def test_every_group_is_a_folder_a_package_and_a_role_of_a_trial() -> None:
     folders = {item.name for item in CONF.iterdir() if item.is_dir()}
-    assert folders == {*GROUPS, PRESET_GROUP}
+    assert folders == {*GROUPS, PRESET_GROUP, RUNNER_GROUP}
     assert all((PACKAGE / group / "base.py").is_file() for group in GROUPS)
     assert [item.name for item in dataclasses.fields(Parts)] == [*GROUPS, *TOP_LEVEL]
 

@@ -153,7 +153,10 @@ def test_a_checked_configuration_builds_again() -> None:
         ("mapping.max_distance_m=1.0", ["trigger.monitor_radius_m = 2.0", "got 1.0"]),
         ("world=file", ["world.path must be given", "world.path=VALUE"]),
         ("strategy=mcr trigger=tbr", ["contradicts"]),
-        ("experiments=mcr/table1", ["no such experiment: mcr/table1, available: none"]),
+        (
+            "experiments=mcr/tabel1",
+            ["no such experiment: mcr/tabel1 (did you mean 'mcr/table1'?), available: "],
+        ),
         ("planner=null", ["planner=None"]),
         ("out=a,b", ["out must be one folder"]),
         ("out=3", ["out must be one folder"]),

@@ -9,11 +9,14 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
+from tests.fields import box, empty, field_from
 from uavexp.explorer.planar import (
+    ascend,
     connected_components,
     density_clusters,
     frontier_cells,
     path_lengths,
+    split_centroids,
     split_long,
     unknown_within,
 )
@@ -46,8 +49,13 @@ def test_path_lengths_equal_scipys(seed: int) -> None:
     rng = np.random.default_rng(seed)
     passable = rng.random((13, 17)) < 0.7
     cost = rng.integers(100, 500, passable.shape).astype(np.int32)
-    lengths = path_lengths(passable, cost, (3, 4))
-    np.testing.assert_allclose(lengths, scipy_lengths(passable, cost, (3, 4)) / 100, rtol=1e-5)
+    expected = scipy_lengths(passable, cost, (3, 4)) / 100
+    everywhere = np.zeros(0, dtype=np.int64)
+    np.testing.assert_allclose(path_lengths(passable, cost, (3, 4), everywhere), expected, rtol=1e-5)
+    wanted = rng.choice(passable.size, 3, replace=False)
+    some = path_lengths(passable, cost, (3, 4), wanted)
+    np.testing.assert_allclose(some.ravel()[wanted], expected.ravel()[wanted], rtol=1e-5)
+    assert (some >= expected * (1.0 - 1e-6)).all()
 
 
 def test_frontier_is_free_beside_unknown() -> None:
@@ -73,16 +81,34 @@ def test_clusters_partition_the_frontier() -> None:
 
 def test_long_clusters_are_split_until_short_and_nothing_is_lost() -> None:
     line = np.stack([np.arange(40), np.full(40, 3)], axis=1).astype(np.int32)
-    parts = split_long(line, 12.0)
+    part = split_long(line, 12.0)
+    parts = [line[part == n] for n in range(part.max() + 1)]
     assert sorted(tuple(cell) for part in parts for cell in part) == [tuple(cell) for cell in line]
     assert all(np.ptp(part[:, 0]) <= 12 for part in parts)
-    np.testing.assert_array_equal(split_long(line[:1], 0.5)[0], line[:1])
+    np.testing.assert_array_equal(split_long(line[:1], 0.5), [0])
+    means = np.array([cells.mean(axis=0) for cells in parts])
+    np.testing.assert_allclose(split_centroids(line, 12.0), means, rtol=1e-12)
+
+
+def test_ascent_ends_where_the_clearance_is_enough_or_at_the_bounds() -> None:
+    occupied = empty((4.0, 4.0, 2.0))
+    box(occupied, (0.0, 0.0, 0.0), (0.1, 4.0, 2.0))
+    field = field_from(occupied)
+    bounds = np.array([[0.5, 0.5, 1.0], [3.5, 3.5, 1.0]])
+    start = np.array([[0.6, 2.0, 1.0], [2.5, 2.0, 1.0]])
+    moved = ascend(field.distance, field.origin_m, field.voxel_size_m, start, 0.1, 20, 0.8, bounds)
+    assert field.distance_m(moved)[0] >= 0.8
+    np.testing.assert_allclose(moved[0, 1:], start[0, 1:])  # straight away from the wall
+    np.testing.assert_array_equal(moved[1], start[1])  # enough already
+    stopped = ascend(field.distance, field.origin_m, field.voxel_size_m, start, 0.1, 3, 0.8, bounds)
+    assert stopped[0, 0] == pytest.approx(0.9)
 
 
 def test_information_counts_unknown_cells_in_a_disc() -> None:
     state = np.zeros((21, 21), dtype=np.uint8)
     inside = np.ones(state.shape, dtype=bool)
     di, dj = np.mgrid[-10:11, -10:11]
-    assert unknown_within(state, inside, (10, 10), 4.5) == int((di**2 + dj**2 <= 4.5**2).sum())
+    cells = np.array([10 * 21 + 10])
+    assert unknown_within(state, inside, cells, 4.5) == [int((di**2 + dj**2 <= 4.5**2).sum())]
     state[:] = 1
-    assert unknown_within(state, inside, (10, 10), 4.5) == 0
+    assert unknown_within(state, inside, cells, 4.5) == [0]

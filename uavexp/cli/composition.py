@@ -9,22 +9,27 @@ own words. The resolved tree is plain data from here on and is checked (`trust`,
 from __future__ import annotations
 
 import copy
+import re
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from uavexp.build import GROUPS, TOP_LEVEL, check_config
-from uavexp.cli.options import EXPERIMENT_GROUP, PRESET_GROUP, list_options, read_option
-from uavexp.cli.overrides import Setting, expand_grid, expand_seeds, quoted
+from uavexp.cli.experiment import Experiment, LabelledCell, expand, list_experiments, read_experiment
+from uavexp.cli.options import EXPERIMENT_GROUP, PRESET_GROUP, RUNNER_GROUP, list_options, read_option
+from uavexp.cli.overrides import Setting, expand_grid, expand_seeds, quoted, render
 from uavexp.errors import ConfigError
 from uavexp.parameters import nearest
-from uavexp.paths import conf_folder
+from uavexp.paths import conf_folder, experiments_folder
 from uavexp.trust import check_trust
 
 TRIGGER_GROUP = "trigger"  # what presets choose
+DEFAULT_PRESET = "mcr"  # config.yaml's
+CELL_AXIS = "cell"
 CONFIG_NAME = "config"
+_KEY_REFERENCE = re.compile(r"\$\{(\w+)\}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,8 +38,9 @@ class Cell:
 
     strategy: str  # the preset's name, else the trigger's
     options: dict[str, str]  # group -> option
-    config: dict[str, Any]  # plain, resolved, checked: groups, step_s, latency_s
-    settings: tuple[Setting, ...]  # what was typed for it, seed and out apart
+    config: dict[str, Any]  # plain, resolved, checked: groups and the keys of no group
+    settings: tuple[Setting, ...]  # what was typed for it, or stands in the experiment's file
+    labels: dict[str, str]  # axis -> its value for this cell
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,6 +50,9 @@ class Command:
     cells: tuple[Cell, ...]
     seeds: tuple[int, ...]
     out: str | None
+    axes: dict[str, tuple[str, ...]]  # values in order; the one axis `cell` without an experiment
+    runner: dict[str, Any]  # how trials are run; no part of what is flown
+    experiment: Experiment | None = None
 
 
 @dataclass(slots=True, kw_only=True)
@@ -52,11 +61,14 @@ class Composer:
 
     user_folder: Path | None = None
     options: dict[str, dict[str, Path]] = field(init=False)
+    experiments: dict[str, Path] = field(init=False)
     _cache: dict[tuple[tuple[str, str], ...], dict[str, Any]] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         folders = [conf_folder(), *([self.user_folder] if self.user_folder else [])]
         self.options = list_options(folders)
+        own = [self.user_folder / "experiments"] if self.user_folder else []
+        self.experiments = list_experiments([experiments_folder(), *own])
         self._cache = {}
 
     def command(self, settings: Sequence[Setting]) -> Command:
@@ -65,19 +77,72 @@ class Composer:
         Raises:
             ConfigError: the first thing that is wrong.
         """
-        ours = {setting.key: setting for setting in settings if setting.key in ("seed", "out")}
-        grid = expand_grid([setting for setting in settings if setting.key not in ours])
-        seeds = expand_seeds(ours["seed"].values) if "seed" in ours else ()
-        defaults = self.compose(grid[0])
-        seeds = seeds or expand_seeds([defaults["seed"]])
-        cells = tuple(self.cell(settings) for settings in grid)
+        typed = {setting.key: setting for setting in settings}
+        ours = {key: typed.pop(key) for key in ("seed", "out", EXPERIMENT_GROUP) if key in typed}
+        runner = {key: typed.pop(key) for key in list(typed) if key.split(".")[0] == RUNNER_GROUP}
+        experiment = self._experiment(ours.get(EXPERIMENT_GROUP))
+        labelled, axes = self._grid(experiment, list(typed.values()))
+        defaults = self.compose([*_single(runner.values()), *labelled[0].settings])
+        seed = (
+            ours["seed"].values if "seed" in ours else (experiment.seed if experiment else defaults["seed"],)
+        )
+        seeds = expand_seeds(seed)
+        cells = tuple(self.cell(item.settings, item.labels) for item in labelled)
         _refuse_equal_cells(cells)
         out = ours["out"].values if "out" in ours else (defaults["out"],)
         if len(out) != 1 or not isinstance(out[0], str | None) or out[0] == "":
             raise ConfigError(f"out must be one folder, got {', '.join(map(repr, out))}")
-        return Command(cells=cells, seeds=seeds, out=out[0])
+        return Command(
+            cells=cells,
+            seeds=seeds,
+            out=out[0],
+            axes=axes,
+            runner=defaults[RUNNER_GROUP],
+            experiment=experiment,
+        )
 
-    def cell(self, settings: Sequence[Setting]) -> Cell:
+    def _experiment(self, setting: Setting | None) -> Experiment | None:
+        if setting is None or setting.values == (None,):
+            return None
+        name = setting.values[0]
+        if len(setting.values) > 1 or not isinstance(name, str):
+            raise ConfigError(
+                f"{EXPERIMENT_GROUP} must be one name, got {', '.join(map(str, setting.values))}"
+            )
+        if name not in self.experiments:
+            raise ConfigError(
+                f"no such experiment: {name}{nearest(name, self.experiments)}, "
+                f"available: {', '.join(self.experiments) or 'none'}"
+            )
+        experiment = read_experiment(name, self.experiments[name])
+        for axis in experiment.axes:
+            if axis in (*GROUPS, *TOP_LEVEL, PRESET_GROUP, RUNNER_GROUP, "seed", "out"):
+                raise ConfigError(f"experiments={name}: an axis may not be called like the key {axis}")
+        return experiment
+
+    def _grid(
+        self, experiment: Experiment | None, typed: Sequence[Setting]
+    ) -> tuple[list[LabelledCell], dict[str, tuple[str, ...]]]:
+        """Cells with their labels, and the axes."""
+        if experiment is not None:
+            cells, axes = expand(experiment, typed)
+        else:
+            swept = [setting.key for setting in typed if len(setting.values) > 1]
+            cells = [
+                LabelledCell(labels={CELL_AXIS: self._cell_name(settings, swept)}, settings=settings)
+                for settings in expand_grid(typed)
+            ]
+            axes = {CELL_AXIS: [cell.labels[CELL_AXIS] for cell in cells]}
+        return cells, {axis: tuple(values) for axis, values in axes.items()}
+
+    def _cell_name(self, settings: Sequence[Setting], swept: Sequence[str]) -> str:
+        """What tells a cell of an ordinary command from the others: preset or trigger, then what varies."""
+        value = {setting.key: setting.values[0] for setting in settings}
+        chosen = value.get(PRESET_GROUP, value.get(TRIGGER_GROUP, DEFAULT_PRESET))
+        varied = [f"{key}={render(value[key])}" for key in swept if key not in (PRESET_GROUP, TRIGGER_GROUP)]
+        return " ".join([str(chosen), *varied])
+
+    def cell(self, settings: Sequence[Setting], labels: Mapping[str, str] | None = None) -> Cell:
         """Compose and check one cell; each setting has one value."""
         tree = self.compose(settings)
         options = {group: tree["hydra"]["runtime"]["choices"][group] for group in GROUPS}
@@ -88,6 +153,7 @@ class Composer:
             options=options,
             config=config,
             settings=tuple(settings),
+            labels=dict(labels or {}),
         )
 
     def compose(self, settings: Sequence[Setting]) -> dict[str, Any]:
@@ -105,9 +171,7 @@ class Composer:
         chosen: dict[str, str] = {}
         values: list[Setting] = []
         for setting in settings:
-            if setting.key in self.options or setting.key == EXPERIMENT_GROUP:
-                if setting.values[0] is None and setting.key == EXPERIMENT_GROUP:
-                    continue
+            if setting.key in self.options:
                 chosen[setting.key] = self._option(setting.key, setting.values[0])
             else:
                 values.append(setting)
@@ -117,8 +181,6 @@ class Composer:
         known = self.options.get(group, {})
         if isinstance(name, str) and name in known:
             return name
-        if group == EXPERIMENT_GROUP:
-            raise ConfigError(f"no such experiment: {name}, available: {', '.join(known) or 'none'}")
         raise ConfigError(
             f"{group}={name}: no such option{nearest(str(name), known)}; {group} may be {', '.join(known)}"
         )
@@ -211,6 +273,15 @@ class Composer:
         ]
 
 
+def _single(settings: Iterable[Setting]) -> list[Setting]:
+    """The settings, each with one value."""
+    found = list(settings)
+    for setting in found:
+        if len(setting.values) != 1:
+            raise ConfigError(f"{setting.key} must have one value, it is no part of a grid")
+    return found
+
+
 def _refuse_equal_cells(cells: Sequence[Cell]) -> None:
     for index, cell in enumerate(cells):
         for other in cells[:index]:
@@ -226,7 +297,10 @@ def _resolve(tree: dict[str, Any]) -> dict[str, Any]:
 
     hydra = tree["hydra"]
     own = {key: value for key, value in tree.items() if key != "hydra"}
-    for key, text in _interpolations(own, ""):
+    found = list(_interpolations(own, ""))
+    if all(_names_plain_key(text, own) for _, text in found):
+        return {**_follow(own, own), "hydra": hydra}  # OmegaConf takes 20 ms for the same
+    for key, text in found:
         if _calls_resolver(text):
             raise ConfigError(f"{key}={text}: only ${{key}} may be used in a value, no ${{resolver:...}}")
     try:
@@ -234,6 +308,23 @@ def _resolve(tree: dict[str, Any]) -> dict[str, Any]:
     except OmegaConfBaseException as error:
         raise ConfigError(f"the configuration does not resolve: {_one_line(error)}") from error
     return {**resolved, "hydra": hydra}
+
+
+def _names_plain_key(text: str, top: Mapping[str, Any]) -> bool:
+    """Whether a text is `${key}` and nothing else, of a top-level key that holds one final value."""
+    match = _KEY_REFERENCE.fullmatch(text)
+    value = top.get(match[1], {}) if match else {}
+    return not isinstance(value, Mapping | list) and "${" not in str(value)
+
+
+def _follow(node: Any, top: Mapping[str, Any]) -> Any:
+    """The node with every `${key}` replaced by that top-level value."""
+    if isinstance(node, dict):
+        return {key: _follow(value, top) for key, value in node.items()}
+    if isinstance(node, list):
+        return [_follow(value, top) for value in node]
+    match = _KEY_REFERENCE.fullmatch(node) if isinstance(node, str) else None
+    return top[match[1]] if match else node
 
 
 def _interpolations(node: Any, path: str) -> Iterator[tuple[str, str]]:

@@ -10,7 +10,8 @@ from pathlib import Path
 from uavexp.errors import ConfigError
 
 PRESET_GROUP = "strategy"  # only overrides other groups; has no component
-EXPERIMENT_GROUP = "experiments"
+EXPERIMENT_GROUP = "experiments"  # files of their own, see `uavexp.cli.experiment`
+RUNNER_GROUP = "runner"  # how trials are run: no part of a trial
 _PARAMETER = re.compile(r"^(?P<name>[A-Za-z_]\w*):\s*(?P<value>.*?)\s*(?:\s#\s*(?P<comment>.*))?$")
 
 

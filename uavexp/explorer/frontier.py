@@ -33,16 +33,16 @@ from uavexp.errors import require, require_non_negative, require_option, require
 from uavexp.explorer.planar import (
     FREE,
     UNKNOWN,
+    ascend,
     connected_components,
     density_clusters,
     frontier_cells,
     path_lengths,
-    split_long,
+    split_centroids,
     unknown_within,
 )
-from uavexp.mapping.base import DistanceField
 from uavexp.mapping.projection import PlanarMap, project
-from uavexp.types import Bool, Float, Float32, Goal, Limits, Observation
+from uavexp.types import Bool, Float, Float32, Goal, Int, Int32, Limits, Observation
 
 
 class Unknown(StrEnum):
@@ -60,20 +60,45 @@ class Clustering(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class _Search:
-    """Graph distances on one planar map, from the vehicle and from the target."""
+class _View:
+    """The planar map as one choice of a goal sees it."""
 
     planar: PlanarMap
     inside: Bool  # (X, Y) cells within the flight bounds
-    from_vehicle: Float32  # (X, Y) path cost from the vehicle, over unknown cells too if optimistic
-    from_target: Float32 | None  # (X, Y) with unknown as free, in cells
+    clear: Bool  # (X, Y) of these, where the body fits as far as is known
+    vehicle: tuple[int, int]
+
+    @property
+    def known(self) -> Bool:
+        """Clear cells known to be free (X, Y)."""
+        return np.asarray(self.clear & (self.planar.state == FREE))
+
+    def flat(self, points_m: Float) -> Int:
+        """Flat indices (N,) of the cells that hold points (N, 3)."""
+        index = np.floor((points_m[:, :2] - self.planar.origin_m) / self.planar.cell_m).astype(np.int64)
+        shape = np.array(self.planar.state.shape)
+        i, j = np.clip(index, 0, shape - 1).T
+        return np.asarray(i * shape[1] + j)
+
+    def lengths(self, passable: Bool, source: tuple[int, int], wanted: Int, unknown_cost: float) -> Float32:
+        """Path lengths (X, Y) from a cell, in cells, exact at the `wanted` ones that can be reached."""
+        wanted = wanted[passable.ravel()[wanted]]
+        if len(wanted) == 0:
+            return np.full(passable.shape, np.inf, dtype=np.float32)
+        dear = np.int32(round(100 * unknown_cost))
+        cost = np.where(self.planar.state == UNKNOWN, dear, np.int32(100))
+        found: Float32 = path_lengths(passable, cost, source, wanted)
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class _Search:
+    """Graph distances on one view, from the vehicle and from the target."""
+
+    view: _View
+    from_vehicle: Float32  # (X, Y) path cost from the vehicle, over unknown cells too if optimistic, in cells
+    from_target: Float32  # (X, Y) with unknown as free, in cells; 0 without a target
     target_known: bool  # whether known-free cells lead from the vehicle to the target
-
-    def cost_m(self, cell: tuple[int, int]) -> float:
-        return float(self.from_vehicle[cell]) * self.planar.cell_m
-
-    def to_target_m(self, cell: tuple[int, int]) -> float:
-        return 0.0 if self.from_target is None else float(self.from_target[cell]) * self.planar.cell_m
 
 
 @dataclass(slots=True, kw_only=True)
@@ -163,8 +188,10 @@ class Frontier:
         """
         now_s = observation.time_s
         self._aside = [entry for entry in self._aside if entry[0] > now_s]
-        search = self._search(observation)
-        best = self._target(search, observation) or self._best_candidate(search, observation)
+        view = self._view(observation)
+        points_m = self._candidates(view, observation)
+        search = self._search(view, observation, points_m)
+        best = self._target(search, observation) or self._best(search, points_m)
         kept = self._kept(search, observation)
         bonus = 0.0 if fresh else self.hysteresis
         # Information is left out of `kept`: what that goal promised is being seen on the way.
@@ -192,9 +219,13 @@ class Frontier:
             self._aside.append((observation.time_s + self.set_aside_s, goal.position_m))
         if self._is_aside(goal.position_m):
             return None
-        return self._score(search, goal.position_m, observation.field)
+        clearance_m = float(observation.field.distance_m(goal.position_m[None])[0])
+        score = float(self._scores(search, goal.position_m[None])[0])
+        if clearance_m <= self.min_clearance_m or not math.isfinite(score):
+            return None
+        return Goal(position_m=goal.position_m, is_target=False, score=score)
 
-    def _search(self, observation: Observation) -> _Search:
+    def _view(self, observation: Observation) -> _View:
         planar = project(
             observation.field,
             z_min_m=self._height_m - self.band_below_m,
@@ -204,95 +235,105 @@ class Frontier:
             occupied_below_m=self.occupied_below_m,
         )
         inside = _inside(planar, observation.flight_bounds_m)
-        clear = inside & (planar.clearance > self.min_clearance_m)
-        unit = np.full(planar.state.shape, 100, dtype=np.int32)
         vehicle = planar.cell_of(observation.state.position_m)
+        clear = inside & (planar.clearance > self.min_clearance_m)
         # Nearer to an obstacle than d_min, the vehicle must still find its way out.
         clear |= inside & (planar.clearance > 0.0) & _within(planar, vehicle, self.escape_m)
-        known = clear & (planar.state == FREE)
-        if self.unknown is Unknown.OPTIMISTIC:
-            dear = np.int32(round(100 * self.unknown_cost))
-            cost = np.where(planar.state == UNKNOWN, dear, unit)
-            from_vehicle = path_lengths(clear, cost, vehicle)
-        else:
-            from_vehicle = path_lengths(known, unit, vehicle)
-        if observation.target_m is None:
-            return _Search(planar, inside, from_vehicle, None, False)
-        target = planar.cell_of(observation.target_m)
-        target_known = bool(known[target]) and bool(np.isfinite(path_lengths(known, unit, vehicle)[target]))
-        return _Search(planar, inside, from_vehicle, path_lengths(clear, unit, target), target_known)
+        return _View(planar, inside, clear, vehicle)
+
+    def _search(self, view: _View, observation: Observation, points_m: Float) -> _Search:
+        """Path lengths to and from everything that will be scored: candidates, kept goal, target."""
+        target_m = observation.target_m
+        kept_m = self._current.position_m[None] if self._current is not None else np.zeros((0, 3))
+        wanted = view.flat(np.concatenate([points_m, kept_m]))
+        known = view.known
+        passable = view.clear if self.unknown is Unknown.OPTIMISTIC else known
+        if target_m is None:
+            from_vehicle = view.lengths(passable, view.vehicle, wanted, self.unknown_cost)
+            return _Search(view, from_vehicle, np.zeros_like(from_vehicle), False)
+        target, target_flat = view.planar.cell_of(target_m), view.flat(target_m[None])
+        target_known = bool(known[target]) and bool(
+            np.isfinite(view.lengths(known, view.vehicle, target_flat, 1.0)[target])
+        )
+        from_target = view.lengths(view.clear, target, wanted, 1.0)
+        if target_known:  # only then can it be the goal, and its cost matters
+            wanted = np.concatenate([wanted, target_flat])
+        from_vehicle = view.lengths(passable, view.vehicle, wanted, self.unknown_cost)
+        return _Search(view, from_vehicle, from_target, target_known)
 
     def _target(self, search: _Search, observation: Observation) -> Goal | None:
         """The mission's target as a goal, None unless known-free cells lead there."""
         target_m = observation.target_m
         if target_m is None or not search.target_known or self._is_aside(target_m):
             return None
-        cost_m = search.cost_m(search.planar.cell_of(target_m))
+        planar = search.view.planar
+        cost_m = float(search.from_vehicle[planar.cell_of(target_m)]) * planar.cell_m
         return Goal(position_m=target_m, is_target=True, score=-self.beta * cost_m)
 
-    def _best_candidate(self, search: _Search, observation: Observation) -> Goal | None:
-        candidates = [
-            goal
-            for cluster in self._clusters(search)
-            if (goal := self._candidate(search, cluster, observation)) is not None
-        ]
-        return max(candidates, key=lambda goal: goal.score, default=None)
+    def _best(self, search: _Search, points_m: Float) -> Goal | None:
+        """The candidate with the highest score, the first of equals."""
+        scores = self._scores(search, points_m)
+        points_m, scores = points_m[np.isfinite(scores)], scores[np.isfinite(scores)]
+        if len(points_m) == 0:
+            return None
+        scores = scores + self.alpha * self._information(search.view, points_m)
+        best = int(np.argmax(scores))
+        return Goal(position_m=points_m[best], is_target=False, score=float(scores[best]))
 
-    def _clusters(self, search: _Search) -> list[np.ndarray]:
-        cells = frontier_cells(search.planar.state, search.inside)
+    def _clusters(self, view: _View) -> list[Int32]:
+        cells = frontier_cells(view.planar.state, view.inside)
         if self.clustering is Clustering.DBSCAN:
             clusters = density_clusters(cells, self.dbscan_radius_m / self.cell_m, self.dbscan_min_neighbours)
         else:
             clusters = connected_components(cells)
+        return [cluster for cluster in clusters if len(cluster) >= self.min_cluster_cells]
+
+    def _candidates(self, view: _View, observation: Observation) -> Float:
+        """One point (N, 3) for each cluster, neither too near the vehicle nor set aside."""
+        clusters = self._clusters(view)
+        if not clusters:
+            return np.zeros((0, 3))
         limit = self.max_cluster_m / self.cell_m
-        return [
-            part
-            for cluster in clusters
-            if len(cluster) >= self.min_cluster_cells
-            for part in split_long(cluster, limit)
-        ]
+        cells = np.concatenate([split_centroids(cluster, limit) for cluster in clusters])
+        start_m = np.column_stack([view.planar.centre_m(cells), np.full(len(cells), self._height_m)])
+        map_ = observation.field
+        points_m: Float = ascend(
+            map_.distance,
+            map_.origin_m,
+            map_.voxel_size_m,
+            start_m,
+            self.ascent_step_m,
+            self.ascent_steps,
+            self.enough_clearance_m,
+            observation.flight_bounds_m,
+        )
+        far = np.linalg.norm(points_m - observation.state.position_m, axis=1) >= self.min_distance_m
+        clear = map_.distance_m(points_m) > self.min_clearance_m
+        return np.asarray(points_m[far & clear & ~self._aside_of(points_m)])
 
-    def _candidate(self, search: _Search, cluster: np.ndarray, observation: Observation) -> Goal | None:
-        centroid = search.planar.centre_m(cluster.mean(axis=0))
-        point = np.append(centroid, self._height_m)
-        point = self._ascend(point, observation.field, observation.flight_bounds_m)
-        if np.linalg.norm(point - observation.state.position_m) < self.min_distance_m:
-            return None
-        return None if self._is_aside(point) else self._score(search, point, observation.field, info=True)
+    def _scores(self, search: _Search, points_m: Float) -> Float:
+        """Score (N,) of points (N, 3) without what they promise to show; -inf: no way there."""
+        view = search.view
+        flat = view.flat(points_m)
+        cost_m = search.from_vehicle.ravel()[flat].astype(np.float64) * view.planar.cell_m
+        to_target_m = search.from_target.ravel()[flat].astype(np.float64) * view.planar.cell_m
+        return np.asarray(-self.beta * cost_m - self.gamma * to_target_m)
 
-    def _ascend(self, point_m: Float, distance: DistanceField, bounds_m: Float) -> Float:
-        """X <- x + alpha_g grad ESDF(x) in the plane until the clearance is enough."""
-        for _ in range(self.ascent_steps):
-            if distance.distance_m(point_m[None])[0] >= self.enough_clearance_m:
-                break
-            gradient = distance.gradient(point_m[None])[0]
-            norm = math.hypot(gradient[0], gradient[1])
-            if norm < 1e-3:
-                break
-            moved = point_m.copy()
-            moved[:2] += self.ascent_step_m * gradient[:2] / norm
-            point_m = np.clip(moved, bounds_m[0], bounds_m[1])
-        point_m[2] = self._height_m
-        return point_m
-
-    def _score(
-        self, search: _Search, point_m: Float, distance: DistanceField, info: bool = False
-    ) -> Goal | None:
-        """Score one goal, None when it is too close to an obstacle or not reachable."""
-        cell = search.planar.cell_of(point_m)
-        cost_m, to_target_m = search.cost_m(cell), search.to_target_m(cell)
-        if not (math.isfinite(cost_m) and math.isfinite(to_target_m)):
-            return None
-        if distance.distance_m(point_m[None])[0] <= self.min_clearance_m:
-            return None
-        score = -self.beta * cost_m - self.gamma * to_target_m
-        if info:
-            radius = self.neighbourhood_m / self.cell_m
-            score += self.alpha * unknown_within(search.planar.state, search.inside, cell, radius)
-        return Goal(position_m=point_m, is_target=False, score=score)
+    def _information(self, view: _View, points_m: Float) -> Float:
+        """J_info (N,): unknown cells around each point (N, 3)."""
+        radius = self.neighbourhood_m / self.cell_m
+        return np.asarray(unknown_within(view.planar.state, view.inside, view.flat(points_m), radius))
 
     def _is_aside(self, point_m: Float) -> bool:
-        return any(float(np.linalg.norm(point_m - other)) < self.aside_radius_m for _, other in self._aside)
+        return bool(self._aside_of(point_m[None])[0])
+
+    def _aside_of(self, points_m: Float) -> Bool:
+        """Which points (N, 3) lie near a goal set aside."""
+        if not self._aside:
+            return np.zeros(len(points_m), dtype=np.bool_)
+        others = np.array([position_m for _, position_m in self._aside])
+        away_m = np.linalg.norm(points_m[:, None] - others, axis=2)
+        return np.asarray((away_m < self.aside_radius_m).any(axis=1))
 
 
 def _inside(planar: PlanarMap, bounds_m: Float) -> Bool:

@@ -8,8 +8,9 @@ import numba as nb
 import numpy as np
 from scipy import ndimage
 
+from uavexp.mapping.field import value_and_gradient
 from uavexp.o3d import open3d
-from uavexp.types import Bool, Float, Float32, Int32, UInt8
+from uavexp.types import Bool, Float, Float32, Int, Int32, UInt8
 
 UNKNOWN, FREE = 0, 1  # values of `PlanarMap.state` used here
 
@@ -22,8 +23,11 @@ _BUCKETS = 1024  # > the longest step, 2 cells of the greatest cost
 
 
 @nb.njit(cache=True)
-def path_lengths(passable: Bool, cost: Int32, source: tuple[int, int]) -> Float32:
+def path_lengths(passable: Bool, cost: Int32, source: tuple[int, int], wanted: Int) -> Float32:
     """Least cost (X, Y), in cells, from the source over passable cells, 8-connected.
+
+    Exact at the `wanted` cells (N,), flat C-order indices: the search ends when it has them
+    all; elsewhere an upper bound. With none wanted it is exact everywhere.
 
     A straight step costs the mean of both cells' `cost` (hundredths, 100 to 500), a
     diagonal one sqrt(2) times that, rounded down to hundredths; no corner is cut: a diagonal
@@ -36,6 +40,11 @@ def path_lengths(passable: Bool, cost: Int32, source: tuple[int, int]) -> Float3
     following = np.full(nx * ny, -1, dtype=np.int32)  # bucket lists, doubly linked
     previous = np.full(nx * ny, -1, dtype=np.int32)
     head = np.full(_BUCKETS, -1, dtype=np.int32)
+    missing = 0
+    asked = np.zeros(nx * ny, dtype=np.bool_)
+    for cell in wanted:
+        missing += not asked[cell]
+        asked[cell] = True
     start = source[0] * ny + source[1]
     length[start] = 0
     head[0] = start
@@ -50,6 +59,10 @@ def path_lengths(passable: Bool, cost: Int32, source: tuple[int, int]) -> Float3
         if following[flat] >= 0:
             previous[following[flat]] = -1
         waiting -= 1
+        if asked[flat]:
+            missing -= 1
+            if missing == 0:
+                break
         i, j = flat // ny, flat % ny
         for n in range(8):
             di, dj = _OFFSETS[n, 0], _OFFSETS[n, 1]
@@ -124,31 +137,113 @@ def density_clusters(cells: Bool, radius_cells: float, min_neighbours: int) -> l
 
 
 @nb.njit(cache=True)
-def unknown_within(state: UInt8, inside: Bool, cell: tuple[int, int], radius_cells: float) -> int:
-    """Number of unknown cells inside the bounds within a radius: J_info of one goal."""
+def unknown_within(state: UInt8, inside: Bool, cells: Int, radius_cells: float) -> Int:
+    """Number (N,) of unknown cells inside the bounds around cells (N,), flat indices: J_info."""
     nx, ny = state.shape
     reach = int(radius_cells)
-    count = 0
-    for i in range(max(cell[0] - reach, 0), min(cell[0] + reach + 1, nx)):
-        for j in range(max(cell[1] - reach, 0), min(cell[1] + reach + 1, ny)):
-            di, dj = i - cell[0], j - cell[1]
-            if di * di + dj * dj <= radius_cells * radius_cells and inside[i, j] and state[i, j] == UNKNOWN:
-                count += 1
+    count = np.zeros(cells.shape[0], dtype=np.int64)
+    for n in range(cells.shape[0]):
+        x, y = cells[n] // ny, cells[n] % ny
+        for i in range(max(x - reach, 0), min(x + reach + 1, nx)):
+            for j in range(max(y - reach, 0), min(y + reach + 1, ny)):
+                near = (i - x) ** 2 + (j - y) ** 2 <= radius_cells * radius_cells
+                if near and inside[i, j] and state[i, j] == UNKNOWN:
+                    count[n] += 1
     return count
 
 
-def split_long(cells: Int32, max_extent_cells: float) -> list[Int32]:
-    """Split a cluster (N, 2) along its principal axis until no part is longer than the limit.
+@nb.njit(cache=True)
+def ascend(
+    distance: Float32,
+    origin_m: Float,
+    voxel_size_m: float,
+    points_m: Float,
+    step_m: float,
+    steps: int,
+    enough_m: float,
+    bounds_m: Float,
+) -> Float:
+    """Points (N, 3) moved by x <- x + alpha_g grad ESDF(x) in their plane until the clearance is enough.
 
-    As in FUEL (Zhou et al. 2021): the centroid of a long curved frontier lies off it.
+    Args:
+        distance: the field's grid.
+        origin_m: (3,) its lower corner.
+        voxel_size_m: edge of its voxels.
+        points_m: where to begin.
+        step_m: alpha_g, the length of one step.
+        steps: at most so many.
+        enough_m: clearance at which a point rests.
+        bounds_m: (2, 3) box that holds every moved point.
     """
-    centred: Float = cells - cells.mean(axis=0)
-    # Principal direction of a 2x2 scatter matrix, closed form: bitwise the same everywhere.
-    xx, yy = float((centred[:, 0] ** 2).sum()), float((centred[:, 1] ** 2).sum())
-    xy = float((centred[:, 0] * centred[:, 1]).sum())
-    angle = 0.5 * math.atan2(2.0 * xy, xx - yy)
-    along = centred[:, 0] * math.cos(angle) + centred[:, 1] * math.sin(angle)
-    if along.max() - along.min() <= max_extent_cells or len(cells) < 2:
-        return [cells]
-    lower = along <= 0.5 * (along.max() + along.min())
-    return split_long(cells[lower], max_extent_cells) + split_long(cells[~lower], max_extent_cells)
+    moved = points_m.copy()
+    for n in range(moved.shape[0]):
+        for _ in range(steps):
+            value, gradient = value_and_gradient(distance, origin_m, voxel_size_m, moved[n : n + 1])
+            norm = math.hypot(gradient[0, 0], gradient[0, 1])
+            if value[0] >= enough_m or norm < 1e-3:
+                break
+            for axis in range(3):
+                if axis < 2:
+                    moved[n, axis] += step_m * gradient[0, axis] / norm
+                moved[n, axis] = min(max(moved[n, axis], bounds_m[0, axis]), bounds_m[1, axis])
+        moved[n, 2] = points_m[n, 2]
+    return moved
+
+
+@nb.njit(cache=True)
+def split_long(cells: Int32, max_extent_cells: float) -> Int:
+    """Part (N,) of each cell (N, 2) of a cluster, halved along its principal axis until none is too long.
+
+    As in FUEL (Zhou et al. 2021): the centroid of a long curved frontier lies off it. Parts
+    are numbered from 0 in the order of the halving, lower half first.
+    """
+    count = cells.shape[0]
+    part = np.zeros(count, dtype=np.int64)
+    waiting = [0]  # parts still to be looked at, the next one last
+    used, done = 1, 0
+    final = np.full(count, -1, dtype=np.int64)
+    along = np.zeros(count)
+    while len(waiting) > 0:
+        now = waiting.pop()
+        size, x, y = 0, 0.0, 0.0
+        for n in range(count):
+            if part[n] == now:
+                size, x, y = size + 1, x + cells[n, 0], y + cells[n, 1]
+        x, y = x / size, y / size
+        xx = yy = xy = 0.0
+        for n in range(count):
+            if part[n] == now:
+                dx, dy = cells[n, 0] - x, cells[n, 1] - y
+                xx, yy, xy = xx + dx * dx, yy + dy * dy, xy + dx * dy
+        angle = 0.5 * math.atan2(2.0 * xy, xx - yy)  # principal direction of a 2x2 scatter matrix
+        low, high = np.inf, -np.inf
+        for n in range(count):
+            if part[n] == now:
+                along[n] = (cells[n, 0] - x) * math.cos(angle) + (cells[n, 1] - y) * math.sin(angle)
+                low, high = min(low, along[n]), max(high, along[n])
+        if high - low <= max_extent_cells or size < 2:
+            for n in range(count):
+                if part[n] == now:
+                    final[n] = done
+            done += 1
+            continue
+        for n in range(count):
+            if part[n] == now:
+                part[n] = used if along[n] <= 0.5 * (low + high) else used + 1
+        waiting.append(used + 1)
+        waiting.append(used)
+        used += 2
+    return final
+
+
+@nb.njit(cache=True)
+def split_centroids(cells: Int32, max_extent_cells: float) -> Float:
+    """Mean cell (P, 2) of each part of a cluster (N, 2) that `split_long` makes."""
+    part = split_long(cells, max_extent_cells)
+    mean = np.zeros((part.max() + 1, 2))
+    size = np.zeros(part.max() + 1)
+    for n in range(cells.shape[0]):
+        size[part[n]] += 1
+        mean[part[n], 0] += cells[n, 0]
+        mean[part[n], 1] += cells[n, 1]
+    return mean / size.reshape(-1, 1)
