@@ -43,6 +43,7 @@ TOP_LEVEL: dict[str, Any] = {
     "stuck_s": float,
     "goals_per_request": int,
     "look_around_radps": float,
+    "turn_first_rad": float,
     "yaw_lookahead_s": float,
 }
 TARGET = "_target_"

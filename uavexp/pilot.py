@@ -38,6 +38,8 @@ from uavexp.types import (
 
 _GOALS_FAULT = (PlanStatus.GOAL_BLOCKED, PlanStatus.NO_PATH, PlanStatus.NOT_CLEAR)  # another may do
 _NEAR_M, _CHANGED_M = 2.0, 0.15  # r_mon and delta_map of paper 1
+_AHEAD_M = 0.1  # a shorter way ahead has no direction
+_REST_MPS = 0.05  # slower is standing
 _SAMPLE_S = 0.1  # spacing of the samples kept of a trajectory
 
 
@@ -47,6 +49,7 @@ class _Pending:
 
     trajectory: Trajectory
     goal: Goal
+    moves_s: float  # before, it only turns
 
 
 @dataclass(slots=True, kw_only=True)
@@ -64,6 +67,7 @@ class Pilot:
     restart_error_m: float
     goals_per_request: int  # so many goals are tried before the vehicle brakes
     look_around_radps: float  # turning while there is no plan
+    turn_first_rad: float  # from standstill, the vehicle turns before it flies where it does not look
     yaw_lookahead_s: float
     yaw_rate_radps: float  # kept below the body-rate limit: roll and pitch need their share
     flight_bounds_m: Float  # (2, 3)
@@ -76,6 +80,7 @@ class Pilot:
     dropped_triggers: int = 0
     failure: str = ""  # reason of the last failed request, "" after a success
     _pending: _Pending | None = None
+    _moves_s: float = -math.inf  # until then the flown trajectory only turns
     _wait_for_rest: bool = False  # after the safety's brake: no new plan before standstill
 
     @property
@@ -86,12 +91,14 @@ class Pilot:
     def reference(self, time_s: float, step_s: float) -> Reference:
         """What to follow now; adopts a plan whose time has come and turns the yaw."""
         if self._pending is not None and time_s >= self._pending.trajectory.start_s - 1e-9:
-            self.trajectory, self.goal, self._pending = self._pending.trajectory, self._pending.goal, None
+            self.trajectory, self.goal = self._pending.trajectory, self._pending.goal
+            self._moves_s, self._pending = self._pending.moves_s, None
         if self.failure and not self._moving(time_s):
             return self._look_around(step_s)
         if self.trajectory is None:
             return self._hold(self.hover_m)
-        ahead_s = min(time_s + self.yaw_lookahead_s, max(time_s, self.trajectory.end_s))
+        ahead_s = max(time_s, self._moves_s) + self.yaw_lookahead_s
+        ahead_s = min(ahead_s, max(time_s, self.trajectory.end_s))
         position, velocity, acceleration = evaluate(self.trajectory, np.array([time_s, ahead_s]))
         rate_radps = self._turn(position[1] - position[0], step_s)
         return Reference(
@@ -119,7 +126,7 @@ class Pilot:
 
     def _turn(self, ahead_m: Float, step_s: float) -> float:
         """Turn the yaw towards the path ahead; return the rate, rad/s."""
-        if math.hypot(ahead_m[0], ahead_m[1]) < 0.1:
+        if math.hypot(ahead_m[0], ahead_m[1]) < _AHEAD_M:
             return 0.0
         error_rad = float(wrap_angle(math.atan2(ahead_m[1], ahead_m[0]) - self.yaw_rad))
         rate_radps = min(max(4.0 * error_rad, -self.yaw_rate_radps), self.yaw_rate_radps)
@@ -210,10 +217,24 @@ class Pilot:
         return position[0], velocity[0], acceleration[0]
 
     def _accept(self, trajectory: Trajectory, goal: Goal, observation: Observation) -> None:
-        flown = with_stop(trajectory, self.limits)
-        self._pending = _Pending(flown, goal)
+        turn_s = self._turn_s(trajectory)
+        flown = with_stop(hover_before(trajectory, turn_s), self.limits)
+        self._pending = _Pending(flown, goal, trajectory.start_s + turn_s)
         self.failure, self._wait_for_rest = "", False
         self.trigger.planned(flown, observation.field)
+
+    def _turn_s(self, trajectory: Trajectory) -> float:
+        """Time to turn until the camera sees where a flight from standstill goes, s.
+
+        Sensing is what keeps the flight off unseen obstacles, under every policy alike.
+        """
+        times_s = trajectory.start_s + np.array([0.0, self.yaw_lookahead_s])
+        position, velocity, _ = evaluate(trajectory, times_s)
+        ahead_m = position[1] - position[0]
+        if float(np.linalg.norm(velocity[0])) > _REST_MPS or math.hypot(ahead_m[0], ahead_m[1]) < _AHEAD_M:
+            return 0.0
+        error_rad = abs(float(wrap_angle(math.atan2(ahead_m[1], ahead_m[0]) - self.yaw_rad)))
+        return max(0.0, error_rad - self.turn_first_rad) / self.yaw_rate_radps
 
     def _note(
         self,
@@ -266,6 +287,19 @@ class Pilot:
 
     def _stopping(self) -> bool:
         return self.trajectory is not None and self.goal is None
+
+
+def hover_before(trajectory: Trajectory, wait_s: float) -> Trajectory:
+    """The trajectory begun `wait_s` later, standing at its start until then; it must start at rest."""
+    if wait_s <= 0.0:
+        return trajectory
+    hover = np.zeros((1, *trajectory.coefficients.shape[1:]))
+    hover[0, 0] = trajectory.coefficients[0, 0]
+    return Trajectory(
+        breaks_s=np.concatenate([trajectory.breaks_s[:1], trajectory.breaks_s + wait_s]),
+        coefficients=np.concatenate([hover, trajectory.coefficients]),
+        at_rest=trajectory.at_rest,
+    )
 
 
 def with_stop(trajectory: Trajectory, limits: Limits) -> Trajectory:

@@ -55,6 +55,7 @@ class Parts:
     stuck_s: float = 20.0
     goals_per_request: int = 3
     look_around_radps: float = 0.8
+    turn_first_rad: float = 0.6
     yaw_lookahead_s: float = 0.8
 
     def __post_init__(self) -> None:
@@ -66,6 +67,7 @@ class Parts:
             restart_error_m=self.restart_error_m,
             yaw_lookahead_s=self.yaw_lookahead_s,
             look_around_radps=self.look_around_radps,
+            turn_first_rad=self.turn_first_rad,
         )
         require(
             self.world_seed is None or self.world_seed >= 0, f"world_seed must be >= 0, got {self.world_seed}"
@@ -201,6 +203,7 @@ def _reset(parts: Parts, world: World, scene: Scene, start: State, seed: int, wa
         restart_error_m=parts.restart_error_m,
         goals_per_request=parts.goals_per_request,
         look_around_radps=parts.look_around_radps,
+        turn_first_rad=parts.turn_first_rad,
         yaw_lookahead_s=parts.yaw_lookahead_s,
         yaw_rate_radps=0.9 * limits.max_body_rate_radps,
         flight_bounds_m=world.flight_bounds_m,

@@ -12,7 +12,7 @@ from tests.unit.test_trigger import LIMITS, change, observe
 from uavexp.explorer.target_only import TargetOnly
 from uavexp.geometry import evaluate
 from uavexp.mapping.base import DistanceField
-from uavexp.pilot import Pilot, with_stop
+from uavexp.pilot import Pilot, hover_before, with_stop
 from uavexp.planner.brake import stopping_distance_m
 from uavexp.planner.min_acc import MinAcc
 from uavexp.recorder import Stopwatch
@@ -52,6 +52,7 @@ def make(trigger: Tbr | Ssp | Mcr, safety: NoBrake | Brake | None = None, latenc
         restart_error_m=0.4,
         goals_per_request=3,
         look_around_radps=0.8,
+        turn_first_rad=0.6,
         yaw_lookahead_s=0.8,
         yaw_rate_radps=1.8,
         flight_bounds_m=BOUNDS,
@@ -167,3 +168,39 @@ def test_a_moving_end_is_followed_by_a_stop() -> None:
     assert np.abs(acceleration).max() <= 2.5 + 1e-9
     assert position[-1, 0] == pytest.approx(3.0 + stopping_distance_m(1.5, LIMITS), abs=1e-6)
     assert with_stop(flown, LIMITS) is flown
+
+
+@pytest.mark.parametrize("yaw_rad", [0.5, 2.0, -3.0])
+def test_from_standstill_it_looks_before_it_flies(yaw_rad: float) -> None:
+    """It used to leave sideways into space the camera had never seen."""
+    pilot = make(Ssp())
+    pilot.yaw_rad = yaw_rad
+    moving_m = []
+    for step in range(600):
+        time_s = step * 0.01
+        reference = pilot.reference(time_s, 0.01)
+        seen = replace(see(room(), time_s, reference), trajectory=pilot.trajectory)
+        if step % 20 == 0:
+            pilot.explore(seen)
+        if np.linalg.norm(reference.position_m - START) > 1e-6:
+            moving_m.append(abs(reference.yaw_rad))  # the way is along x
+    assert moving_m[0] <= 0.6 + 1.8 * 0.02
+    assert pilot.trajectory is not None
+    waited_s = max(0.0, abs(yaw_rad) - 0.6) / 1.8
+    moves_s = 6.0 - 0.01 * len(moving_m)
+    assert moves_s == pytest.approx(0.03 + waited_s, abs=0.03)
+    np.testing.assert_allclose(pilot.reference(9.0, 0.01).position_m, TARGET, atol=1e-6)
+
+
+def test_a_hover_before_a_flight_shifts_it_and_nothing_else() -> None:
+    pilot = make(Ssp())
+    fly(pilot, {0.0: room()}, 0.1)
+    flown = pilot.trajectory
+    assert flown is not None
+    later = hover_before(flown, 0.7)
+    times_s = np.linspace(flown.start_s, flown.end_s, 50)
+    for before, after in zip(evaluate(flown, times_s), evaluate(later, times_s + 0.7), strict=True):
+        np.testing.assert_allclose(after, before, atol=1e-9)
+    np.testing.assert_allclose(evaluate(later, np.array([flown.start_s + 0.3]))[0][0], START)
+    assert later.start_s == flown.start_s
+    assert hover_before(flown, 0.0) is flown

@@ -132,6 +132,7 @@ class Frontier:
     escape_m: float = 0.6
     set_aside_s: float = 10.0
     _height_m: float = field(init=False, repr=False, default=0.0)
+    _body_radius_m: float = field(init=False, repr=False, default=0.0)
     _current: Goal | None = field(init=False, repr=False, default=None)
     _aside: list[tuple[float, Float]] = field(init=False, repr=False, default_factory=list)
 
@@ -173,6 +174,7 @@ class Frontier:
     def reset(self, flight_height_m: float, limits: Limits) -> None:
         """Begin a trial at this flight height."""
         self._height_m = flight_height_m
+        self._body_radius_m = limits.body_radius_m
         self._current = None
         self._aside = []
 
@@ -188,16 +190,22 @@ class Frontier:
         """
         now_s = observation.time_s
         self._aside = [entry for entry in self._aside if entry[0] > now_s]
-        view = self._view(observation)
-        points_m = self._candidates(view, observation)
-        search = self._search(view, observation, points_m)
-        best = self._target(search, observation) or self._best(search, points_m)
-        kept = self._kept(search, observation)
+        best, kept = self._choose(observation, self.min_clearance_m)
+        if best is None and kept is None:  # a doorway passed before it was mapped may look too narrow
+            best, kept = self._choose(observation, min(self._body_radius_m, self.min_clearance_m))
         bonus = 0.0 if fresh else self.hysteresis
         # Information is left out of `kept`: what that goal promised is being seen on the way.
         if kept is None or (best is not None and (best.is_target or best.score >= kept.score + bonus)):
             self._current = best or self._last_resort(observation)
         return self._current
+
+    def _choose(self, observation: Observation, clearance_m: float) -> tuple[Goal | None, Goal | None]:
+        """Best goal, and the kept one scored anew, over cells with more than this clearance."""
+        view = self._view(observation, clearance_m)
+        points_m = self._candidates(view, observation)
+        search = self._search(view, observation, points_m)
+        best = self._target(search, observation) or self._best(search, points_m)
+        return best, self._kept(search, observation)
 
     def _last_resort(self, observation: Observation) -> Goal | None:
         """The target through unknown space when no frontier is left; the planner searches in 3D."""
@@ -225,7 +233,7 @@ class Frontier:
             return None
         return Goal(position_m=goal.position_m, is_target=False, score=score)
 
-    def _view(self, observation: Observation) -> _View:
+    def _view(self, observation: Observation, clearance_m: float) -> _View:
         planar = project(
             observation.field,
             z_min_m=self._height_m - self.band_below_m,
@@ -236,8 +244,8 @@ class Frontier:
         )
         inside = _inside(planar, observation.flight_bounds_m)
         vehicle = planar.cell_of(observation.state.position_m)
-        clear = inside & (planar.clearance > self.min_clearance_m)
-        # Nearer to an obstacle than d_min, the vehicle must still find its way out.
+        clear = inside & (planar.clearance > clearance_m)
+        # Nearer to an obstacle than that, the vehicle must still find its way out.
         clear |= inside & (planar.clearance > 0.0) & _within(planar, vehicle, self.escape_m)
         return _View(planar, inside, clear, vehicle)
 
