@@ -17,7 +17,7 @@ import numpy as np
 from uavexp.explorer.base import Explorer
 from uavexp.geometry import evaluate, sample_times, wrap_angle
 from uavexp.planner.base import Planner
-from uavexp.planner.brake import braking_trajectory
+from uavexp.planner.brake import braking_trajectory, hover_before, with_stop
 from uavexp.recorder import Stopwatch
 from uavexp.safety.base import Safety
 from uavexp.trigger.base import TriggerPolicy
@@ -287,41 +287,6 @@ class Pilot:
 
     def _stopping(self) -> bool:
         return self.trajectory is not None and self.goal is None
-
-
-def hover_before(trajectory: Trajectory, wait_s: float) -> Trajectory:
-    """The trajectory begun `wait_s` later, standing at its start until then; it must start at rest."""
-    if wait_s <= 0.0:
-        return trajectory
-    hover = np.zeros((1, *trajectory.coefficients.shape[1:]))
-    hover[0, 0] = trajectory.coefficients[0, 0]
-    return Trajectory(
-        breaks_s=np.concatenate([trajectory.breaks_s[:1], trajectory.breaks_s + wait_s]),
-        coefficients=np.concatenate([hover, trajectory.coefficients]),
-        at_rest=trajectory.at_rest,
-    )
-
-
-def with_stop(trajectory: Trajectory, limits: Limits) -> Trajectory:
-    """The trajectory, with a stop after its end when it does not end at rest.
-
-    What is flown when no further plan arrives, so triggers and the brake watch it too.
-    """
-    if trajectory.at_rest:
-        return trajectory
-    end_s = trajectory.end_s
-    position, velocity, acceleration = evaluate(trajectory, np.array([end_s]))
-    stop = braking_trajectory(end_s, position[0], velocity[0], acceleration[0], limits)
-    terms = max(trajectory.coefficients.shape[1], stop.coefficients.shape[1])
-    pieces = [
-        np.pad(part.coefficients, ((0, 0), (0, terms - part.coefficients.shape[1]), (0, 0)))
-        for part in (trajectory, stop)
-    ]
-    return Trajectory(
-        breaks_s=np.concatenate([trajectory.breaks_s, stop.breaks_s[1:]]),
-        coefficients=np.concatenate(pieces),
-        at_rest=True,
-    )
 
 
 def _near_change(observation: Observation) -> bool:

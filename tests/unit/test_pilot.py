@@ -12,8 +12,8 @@ from tests.unit.test_trigger import LIMITS, change, observe
 from uavexp.explorer.target_only import TargetOnly
 from uavexp.geometry import evaluate
 from uavexp.mapping.base import DistanceField
-from uavexp.pilot import Pilot, hover_before, with_stop
-from uavexp.planner.brake import stopping_distance_m
+from uavexp.pilot import Pilot
+from uavexp.planner.brake import hover_before, stopping_distance_m, with_stop
 from uavexp.planner.min_acc import MinAcc
 from uavexp.recorder import Stopwatch
 from uavexp.safety.brake import Brake

@@ -31,18 +31,16 @@ import numpy as np
 
 from uavexp.errors import require, require_non_negative, require_option, require_positive
 from uavexp.explorer.planar import (
-    FREE,
-    UNKNOWN,
     ascend,
     connected_components,
     density_clusters,
     frontier_cells,
-    path_lengths,
     split_centroids,
     unknown_within,
 )
-from uavexp.mapping.projection import PlanarMap, project
-from uavexp.types import Bool, Float, Float32, Goal, Int, Int32, Limits, Observation
+from uavexp.explorer.view import Search, View, view_of
+from uavexp.mapping.projection import project
+from uavexp.types import Bool, Float, Goal, Int32, Limits, Observation
 
 
 class Unknown(StrEnum):
@@ -57,48 +55,6 @@ class Clustering(StrEnum):
 
     COMPONENTS = "components"
     DBSCAN = "dbscan"
-
-
-@dataclass(frozen=True, slots=True)
-class _View:
-    """The planar map as one choice of a goal sees it."""
-
-    planar: PlanarMap
-    inside: Bool  # (X, Y) cells within the flight bounds
-    clear: Bool  # (X, Y) of these, where the body fits as far as is known
-    vehicle: tuple[int, int]
-
-    @property
-    def known(self) -> Bool:
-        """Clear cells known to be free (X, Y)."""
-        return np.asarray(self.clear & (self.planar.state == FREE))
-
-    def flat(self, points_m: Float) -> Int:
-        """Flat indices (N,) of the cells that hold points (N, 3)."""
-        index = np.floor((points_m[:, :2] - self.planar.origin_m) / self.planar.cell_m).astype(np.int64)
-        shape = np.array(self.planar.state.shape)
-        i, j = np.clip(index, 0, shape - 1).T
-        return np.asarray(i * shape[1] + j)
-
-    def lengths(self, passable: Bool, source: tuple[int, int], wanted: Int, unknown_cost: float) -> Float32:
-        """Path lengths (X, Y) from a cell, in cells, exact at the `wanted` ones that can be reached."""
-        wanted = wanted[passable.ravel()[wanted]]
-        if len(wanted) == 0:
-            return np.full(passable.shape, np.inf, dtype=np.float32)
-        dear = np.int32(round(100 * unknown_cost))
-        cost = np.where(self.planar.state == UNKNOWN, dear, np.int32(100))
-        found: Float32 = path_lengths(passable, cost, source, wanted)
-        return found
-
-
-@dataclass(frozen=True, slots=True)
-class _Search:
-    """Graph distances on one view, from the vehicle and from the target."""
-
-    view: _View
-    from_vehicle: Float32  # (X, Y) path cost from the vehicle, over unknown cells too if optimistic, in cells
-    from_target: Float32  # (X, Y) with unknown as free, in cells; 0 without a target
-    target_known: bool  # whether known-free cells lead from the vehicle to the target
 
 
 @dataclass(slots=True, kw_only=True)
@@ -214,7 +170,7 @@ class Frontier:
             return None
         return Goal(position_m=target_m, is_target=True, score=-math.inf)
 
-    def _kept(self, search: _Search, observation: Observation) -> Goal | None:
+    def _kept(self, search: Search, observation: Observation) -> Goal | None:
         """Score the current goal anew; None when it is near, set aside or not reachable any more."""
         goal, position_m = self._current, observation.state.position_m
         if goal is None:
@@ -233,7 +189,7 @@ class Frontier:
             return None
         return Goal(position_m=goal.position_m, is_target=False, score=score)
 
-    def _view(self, observation: Observation, clearance_m: float) -> _View:
+    def _view(self, observation: Observation, clearance_m: float) -> View:
         planar = project(
             observation.field,
             z_min_m=self._height_m - self.band_below_m,
@@ -242,14 +198,10 @@ class Frontier:
             cell_m=self.cell_m,
             occupied_below_m=self.occupied_below_m,
         )
-        inside = _inside(planar, observation.flight_bounds_m)
-        vehicle = planar.cell_of(observation.state.position_m)
-        clear = inside & (planar.clearance > clearance_m)
-        # Nearer to an obstacle than that, the vehicle must still find its way out.
-        clear |= inside & (planar.clearance > 0.0) & _within(planar, vehicle, self.escape_m)
-        return _View(planar, inside, clear, vehicle)
+        position_m, bounds_m = observation.state.position_m, observation.flight_bounds_m
+        return view_of(planar, position_m, bounds_m, clearance_m, self.escape_m)
 
-    def _search(self, view: _View, observation: Observation, points_m: Float) -> _Search:
+    def _search(self, view: View, observation: Observation, points_m: Float) -> Search:
         """Path lengths to and from everything that will be scored: candidates, kept goal, target."""
         target_m = observation.target_m
         kept_m = self._current.position_m[None] if self._current is not None else np.zeros((0, 3))
@@ -258,7 +210,7 @@ class Frontier:
         passable = view.clear if self.unknown is Unknown.OPTIMISTIC else known
         if target_m is None:
             from_vehicle = view.lengths(passable, view.vehicle, wanted, self.unknown_cost)
-            return _Search(view, from_vehicle, np.zeros_like(from_vehicle), False)
+            return Search(view, from_vehicle, np.zeros_like(from_vehicle), False)
         target, target_flat = view.planar.cell_of(target_m), view.flat(target_m[None])
         target_known = bool(known[target]) and bool(
             np.isfinite(view.lengths(known, view.vehicle, target_flat, 1.0)[target])
@@ -267,9 +219,9 @@ class Frontier:
         if target_known:  # only then can it be the goal, and its cost matters
             wanted = np.concatenate([wanted, target_flat])
         from_vehicle = view.lengths(passable, view.vehicle, wanted, self.unknown_cost)
-        return _Search(view, from_vehicle, from_target, target_known)
+        return Search(view, from_vehicle, from_target, target_known)
 
-    def _target(self, search: _Search, observation: Observation) -> Goal | None:
+    def _target(self, search: Search, observation: Observation) -> Goal | None:
         """The mission's target as a goal, None unless known-free cells lead there."""
         target_m = observation.target_m
         if target_m is None or not search.target_known or self._is_aside(target_m):
@@ -278,7 +230,7 @@ class Frontier:
         cost_m = float(search.from_vehicle[planar.cell_of(target_m)]) * planar.cell_m
         return Goal(position_m=target_m, is_target=True, score=-self.beta * cost_m)
 
-    def _best(self, search: _Search, points_m: Float) -> Goal | None:
+    def _best(self, search: Search, points_m: Float) -> Goal | None:
         """The candidate with the highest score, the first of equals."""
         scores = self._scores(search, points_m)
         points_m, scores = points_m[np.isfinite(scores)], scores[np.isfinite(scores)]
@@ -288,7 +240,7 @@ class Frontier:
         best = int(np.argmax(scores))
         return Goal(position_m=points_m[best], is_target=False, score=float(scores[best]))
 
-    def _clusters(self, view: _View) -> list[Int32]:
+    def _clusters(self, view: View) -> list[Int32]:
         cells = frontier_cells(view.planar.state, view.inside)
         if self.clustering is Clustering.DBSCAN:
             clusters = density_clusters(cells, self.dbscan_radius_m / self.cell_m, self.dbscan_min_neighbours)
@@ -296,7 +248,7 @@ class Frontier:
             clusters = connected_components(cells)
         return [cluster for cluster in clusters if len(cluster) >= self.min_cluster_cells]
 
-    def _candidates(self, view: _View, observation: Observation) -> Float:
+    def _candidates(self, view: View, observation: Observation) -> Float:
         """One point (N, 3) for each cluster, neither too near the vehicle nor set aside."""
         clusters = self._clusters(view)
         if not clusters:
@@ -319,7 +271,7 @@ class Frontier:
         clear = map_.distance_m(points_m) > self.min_clearance_m
         return np.asarray(points_m[far & clear & ~self._aside_of(points_m)])
 
-    def _scores(self, search: _Search, points_m: Float) -> Float:
+    def _scores(self, search: Search, points_m: Float) -> Float:
         """Score (N,) of points (N, 3) without what they promise to show; -inf: no way there."""
         view = search.view
         flat = view.flat(points_m)
@@ -327,7 +279,7 @@ class Frontier:
         to_target_m = search.from_target.ravel()[flat].astype(np.float64) * view.planar.cell_m
         return np.asarray(-self.beta * cost_m - self.gamma * to_target_m)
 
-    def _information(self, view: _View, points_m: Float) -> Float:
+    def _information(self, view: View, points_m: Float) -> Float:
         """J_info (N,): unknown cells around each point (N, 3)."""
         radius = self.neighbourhood_m / self.cell_m
         return np.asarray(unknown_within(view.planar.state, view.inside, view.flat(points_m), radius))
@@ -342,19 +294,3 @@ class Frontier:
         others = np.array([position_m for _, position_m in self._aside])
         away_m = np.linalg.norm(points_m[:, None] - others, axis=2)
         return np.asarray((away_m < self.aside_radius_m).any(axis=1))
-
-
-def _inside(planar: PlanarMap, bounds_m: Float) -> Bool:
-    nx, ny = planar.state.shape
-    x = planar.origin_m[0] + (np.arange(nx) + 0.5) * planar.cell_m
-    y = planar.origin_m[1] + (np.arange(ny) + 0.5) * planar.cell_m
-    within_x = (x >= bounds_m[0, 0]) & (x <= bounds_m[1, 0])
-    within_y = (y >= bounds_m[0, 1]) & (y <= bounds_m[1, 1])
-    inside: Bool = within_x[:, None] & within_y[None, :]
-    return inside
-
-
-def _within(planar: PlanarMap, cell: tuple[int, int], radius_m: float) -> Bool:
-    i, j = np.ogrid[: planar.state.shape[0], : planar.state.shape[1]]
-    near: Bool = (i - cell[0]) ** 2 + (j - cell[1]) ** 2 <= (radius_m / planar.cell_m) ** 2
-    return near

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from uavexp.geometry import GRAVITY_MPS2
+from uavexp.geometry import GRAVITY_MPS2, evaluate
 from uavexp.types import Float, Limits, Trajectory
 
 _SHORTEST_PIECE_S = 1e-6
@@ -120,3 +120,38 @@ def _pieces(
         velocity = velocity + duration * (accelerations[k] + 0.5 * duration * jerk)
         breaks.append(breaks[-1] + duration)
     return Trajectory(breaks_s=np.array(breaks), coefficients=np.stack(coefficients), at_rest=True)
+
+
+def hover_before(trajectory: Trajectory, wait_s: float) -> Trajectory:
+    """The trajectory begun `wait_s` later, standing at its start until then; it must start at rest."""
+    if wait_s <= 0.0:
+        return trajectory
+    hover = np.zeros((1, *trajectory.coefficients.shape[1:]))
+    hover[0, 0] = trajectory.coefficients[0, 0]
+    return Trajectory(
+        breaks_s=np.concatenate([trajectory.breaks_s[:1], trajectory.breaks_s + wait_s]),
+        coefficients=np.concatenate([hover, trajectory.coefficients]),
+        at_rest=trajectory.at_rest,
+    )
+
+
+def with_stop(trajectory: Trajectory, limits: Limits) -> Trajectory:
+    """The trajectory, with a stop after its end when it does not end at rest.
+
+    What is flown when no further plan arrives, so triggers and the brake watch it too.
+    """
+    if trajectory.at_rest:
+        return trajectory
+    end_s = trajectory.end_s
+    position, velocity, acceleration = evaluate(trajectory, np.array([end_s]))
+    stop = braking_trajectory(end_s, position[0], velocity[0], acceleration[0], limits)
+    terms = max(trajectory.coefficients.shape[1], stop.coefficients.shape[1])
+    pieces = [
+        np.pad(part.coefficients, ((0, 0), (0, terms - part.coefficients.shape[1]), (0, 0)))
+        for part in (trajectory, stop)
+    ]
+    return Trajectory(
+        breaks_s=np.concatenate([trajectory.breaks_s, stop.breaks_s[1:]]),
+        coefficients=np.concatenate(pieces),
+        at_rest=True,
+    )
