@@ -5,8 +5,9 @@ from __future__ import annotations
 import ast
 from pathlib import Path
 
+from uavexp.cli.experiment import list_experiments, read_experiment
 from uavexp.cli.options import PRESET_GROUP, Option, list_options, read_option
-from uavexp.paths import PACKAGE, conf_folder
+from uavexp.paths import PACKAGE, conf_folder, experiments_folder
 
 USAGE = """\
 uavexp flies seeded trials of UAV navigation in unknown indoor spaces.
@@ -17,6 +18,8 @@ python -m uavexp [GROUP=OPTION ...] [GROUP.PARAMETER=VALUE ...] [seed=SEEDS] [ou
   python -m uavexp strategy=mcr seed=0:20           twenty trials (the stop is excluded)
   python -m uavexp -m strategy=mcr,tbr,ssp seed=0:20                 a grid
   python -m uavexp -m strategy=mcr trigger.delta_map_m=0.05,0.10,0.15 seed=0:20
+  python -m uavexp experiments=mcr/table1           every trial, table and figure of one paper table
+  python -m uavexp experiments=mcr/table1 seed=0:2 arm=MCR,TBR      less of it
   python -m uavexp world=file world.path=office.ply your own building
   python -m uavexp --help world                     the parameters of one group
 
@@ -24,8 +27,10 @@ seeds     seed=3   seed=1,4,7   seed=0:20   'seed=range(0,20)'   seed=range (the
 grids     a,b,c after any = flies every combination, with or without -m
 lists     world.size_m=[20,12,3] without spaces; quote what your shell or Hydra's grammar would
           take apart: 'world.path="/data/hall (2).ply"'
-output    trials.parquet and one folder per trial with record.json, log.npz, picture.png, wall.json;
-          in out=DIR or a new folder under outputs/, which is printed last
+output    trials.parquet, replans.parquet and one folder per trial with record.json, log.npz, picture.png,
+          wall.json; in out=DIR or a new folder under outputs/, which is printed last
+studies   an experiment has one folder, outputs/NAME: the same command again flies what is missing
+          or failed; python -m uavexp.report DIR makes tables and figures again without flying
 exit code 0 all flown, 1 some trial raised, 2 bad input (one line says what), 130 interrupted
 
 flags
@@ -49,9 +54,16 @@ def help_text(user_folder: Path | None = None, group: str | None = None) -> str:
     for name, files in _ordered(options).items():
         words = [f"{'*' if defaults.get(name) == option else ''}{option}" for option in files]
         lines.append(f"  {name:<11} {'  '.join(words)}")
-    lines += ["", "keys of no group", *_parameter_lines(config, ""), ""]
+    lines += ["", "keys of no group", *_parameter_lines(config, "")]
+    lines += ["", "experiments", *_experiment_lines(user_folder), ""]
     lines += [_group_text(name, files) for name, files in _ordered(options).items() if name != PRESET_GROUP]
     return "\n".join(lines).rstrip() + "\n"
+
+
+def _experiment_lines(user_folder: Path | None) -> list[str]:
+    own = [user_folder / "experiments"] if user_folder else []
+    files = list_experiments([experiments_folder(), *own])
+    return [f"  {name:<26} {read_experiment(name, file).title}" for name, file in files.items()]
 
 
 def group_names(user_folder: Path | None = None) -> list[str]:
