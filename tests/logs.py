@@ -88,11 +88,13 @@ def make_log(
         "esdf_clearance_m": np.full(ticks.size, 1.1),
         "changed_voxels": np.zeros(ticks.size, dtype=np.int64),
         "decision_score": np.zeros(ticks.size),
+        "remaining_clearance_m": np.ones(ticks.size),
         "replans": (),
         "dropped_triggers": 0,
         "contacts": (),
         "goals_m": np.zeros((0, 3)),
         "seen_share": float("nan"),
+        "body_radius_m": 0.226,
         "mapped_m": np.zeros((0, 3), dtype=np.float32),
     }
     return TrialLog(**(values | fields))
@@ -103,6 +105,7 @@ def empty_log(**fields: Any) -> TrialLog:
     vectors = ("position_m", "velocity_mps", "estimated_position_m", "reference_position_m")
     vectors += ("reference_acceleration_mps2",)
     series = ("time_s", "clearance_m", "tick_s", "esdf_clearance_m", "decision_score")
+    series += ("remaining_clearance_m",)
     rows: dict[str, Any] = {name: np.zeros((0, 3)) for name in vectors}
     rows |= {name: np.zeros(0) for name in series}
     rows |= {"quaternion_wxyz": np.zeros((0, 4)), "changed_voxels": np.zeros(0, dtype=np.int64)}

@@ -6,15 +6,16 @@ import dataclasses
 import hashlib
 import io
 import zipfile
+import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from uavexp.errors import RecordError
-from uavexp.records import write_atomically
+from uavexp.records import write_bytes
 from uavexp.types import Contact, Outcome, PlanStatus, Replan, TrialLog
 
 Arrays = dict[str, npt.NDArray[Any]]
@@ -49,19 +50,37 @@ def arrays_digest(arrays: Mapping[str, npt.NDArray[Any]]) -> str:
     return total.hexdigest()
 
 
+def pack(arrays: Mapping[str, npt.NDArray[Any]]) -> bytes:
+    """Arrays as a compressed npz whose bytes depend on nothing but the arrays."""
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED, compresslevel=4) as archive:
+        for name in sorted(arrays):
+            entry = zipfile.ZipInfo(f"{name}.npy", _EPOCH)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            buffer = io.BytesIO()
+            np.lib.format.write_array(buffer, np.asarray(arrays[name], order="C"), allow_pickle=False)
+            archive.writestr(entry, buffer.getvalue())
+    return packed.getvalue()
+
+
+def unpack(path: Path) -> Arrays:
+    """Arrays of an npz file.
+
+    Raises:
+        RecordError: missing or damaged.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            return {name: archive[name] for name in archive.files}
+    except (ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        raise RecordError(f"{path}: damaged ({error})") from error
+    except OSError as error:
+        raise RecordError(f"{path}: cannot be read ({error})") from error
+
+
 def write_log(path: Path, arrays: Mapping[str, npt.NDArray[Any]]) -> None:
-    """Write arrays as a compressed npz whose bytes depend on nothing but the arrays."""
-
-    def write(file: IO[bytes]) -> None:
-        with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=4) as archive:
-            for name in sorted(arrays):
-                entry = zipfile.ZipInfo(f"{name}.npy", _EPOCH)
-                entry.compress_type = zipfile.ZIP_DEFLATED
-                buffer = io.BytesIO()
-                np.lib.format.write_array(buffer, np.asarray(arrays[name], order="C"), allow_pickle=False)
-                archive.writestr(entry, buffer.getvalue())
-
-    write_atomically(path, write)
+    """Write the arrays of a log atomically; equal logs give equal bytes."""
+    write_bytes(path, pack(arrays))
 
 
 def read_log(path: Path) -> TrialLog:
@@ -70,14 +89,11 @@ def read_log(path: Path) -> TrialLog:
     Raises:
         RecordError: missing, damaged, or not a log.
     """
+    arrays = unpack(path)
     try:
-        with np.load(path, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
         return _log_of(arrays)
-    except OSError as error:
-        raise RecordError(f"{path}: cannot be read ({error})") from error
-    except (ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-        raise RecordError(f"{path}: damaged or no log ({error})") from error
+    except (ValueError, KeyError, TypeError) as error:
+        raise RecordError(f"{path}: no log ({error})") from error
 
 
 def _log_of(arrays: Arrays) -> TrialLog:

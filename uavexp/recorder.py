@@ -13,6 +13,7 @@ from scipy import ndimage
 
 from uavexp.mapping.base import OCCUPIED, DistanceField
 from uavexp.scene import Scene
+from uavexp.trigger.validity import clearance_ahead_m
 from uavexp.types import (
     Contact,
     Float,
@@ -52,7 +53,7 @@ class Recorder:
     """Rows of the log: one per step, one per ESDF update, and the goals pursued."""
 
     steps: list[tuple[float, Float, Float, Float, Float, Float, Float]] = field(default_factory=list)
-    ticks: list[tuple[float, float, int, float]] = field(default_factory=list)
+    ticks: list[tuple[float, float, int, float, float]] = field(default_factory=list)
     goals_m: list[Float] = field(default_factory=list)
 
     def step(self, time_s: float, state: State, estimate: State, reference: Reference) -> None:
@@ -70,9 +71,16 @@ class Recorder:
         )
 
     def tick(self, observation: Observation, score: float) -> None:
-        """Add the row of one ESDF update, and the goal if it is a new one."""
+        """Add the row of one ESDF update, and the goal if it is a new one.
+
+        The observation is the one that was decided on: a plan asked for in this very tick is not
+        flown yet, so a policy that answers at once has no delay.
+        """
         clearance_m = float(observation.field.distance_m(observation.state.position_m[None])[0])
-        self.ticks.append((observation.time_s, clearance_m, len(observation.update.voxel), score))
+        changed = len(observation.update.voxel)
+        self.ticks.append(
+            (observation.time_s, clearance_m, changed, score, remaining_clearance_m(observation))
+        )
         goal = observation.goal
         if goal is not None and not (self.goals_m and np.array_equal(self.goals_m[-1], goal.position_m)):
             self.goals_m.append(goal.position_m)
@@ -96,13 +104,14 @@ class Recorder:
         dropped_triggers: int,
         contacts: tuple[Contact, ...],
         seen_share: float,
+        body_radius_m: float = math.nan,
         watch: Stopwatch,
     ) -> TrialLog:
         """Return the finished log; true clearances are measured here, all at once."""
         times, position, velocity, quaternion, estimated, reference, acceleration = zip(
             *self.steps, strict=True
         )
-        tick_s, esdf_m, changed, score = zip(*self.ticks, strict=True)
+        tick_s, esdf_m, changed, score, remaining_m = zip(*self.ticks, strict=True)
         mapped = np.flatnonzero(field.state == OCCUPIED)
         return TrialLog(
             outcome=outcome,
@@ -120,14 +129,24 @@ class Recorder:
             esdf_clearance_m=np.array(esdf_m),
             changed_voxels=np.array(changed, dtype=np.int64),
             decision_score=np.array(score),
+            remaining_clearance_m=np.array(remaining_m),
             replans=replans,
             dropped_triggers=dropped_triggers,
             contacts=contacts,
             goals_m=np.array(self.goals_m).reshape(-1, 3),
             seen_share=seen_share,
+            body_radius_m=body_radius_m,
             mapped_m=field.voxel_centres_m(mapped).astype(np.float32),
             wall_s={name: np.array(laps) for name, laps in watch.laps_s.items()},
         )
+
+
+def remaining_clearance_m(observation: Observation) -> float:
+    """Least mapped distance over what is left of the flown trajectory, m; NaN when nothing is."""
+    trajectory, now_s = observation.trajectory, observation.time_s
+    if trajectory is None or now_s >= trajectory.end_s:
+        return math.nan
+    return float(clearance_ahead_m(trajectory, observation.field, now_s).min())
 
 
 def seen_share(

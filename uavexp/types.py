@@ -7,6 +7,7 @@ Shapes stand beside the types.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TYPE_CHECKING
@@ -350,5 +351,9 @@ class TrialLog:
     seen_share: float  # observed share of the reachable free volume; NaN when not asked for
     # the map at the end, for pictures: occupied voxel centres
     mapped_m: Float32  # (N, 3)
+    # one row per ESDF update again: least mapped distance over the rest of the flown trajectory;
+    # NaN where nothing is left of one, empty when it was not measured
+    remaining_clearance_m: Float = field(default_factory=lambda: np.zeros(0))  # (M,)
+    body_radius_m: float = math.nan  # circle around the body: a trajectory nearer than this is blocked
     # clock times, never part of the record: name -> seconds of each call
     wall_s: dict[str, Float] = field(default_factory=dict)

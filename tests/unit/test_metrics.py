@@ -10,6 +10,7 @@ import pytest
 
 from tests.logs import empty_log, make_log, make_replan, make_world, still_curve
 from uavexp.metrics import evaluate
+from uavexp.metrics.replanning import CAUSES
 from uavexp.metrics.smoothness import derivative
 from uavexp.types import Contact, Outcome, TrialLog
 
@@ -185,6 +186,7 @@ class TestReplans:
         assert values["replans_goal"] == 1
         assert values["replans_clock"] == 1
         assert values["replans_other"] == 1
+        assert sum(values[f"replans_{cause}"] for cause in (*CAUSES, "other")) == 4
         assert values["failed_plans"] == 1
         assert values["replans_per_m"] == pytest.approx(0.4, rel=1e-9)
         assert values["replans_per_s"] == pytest.approx(0.4, rel=1e-9)

@@ -8,71 +8,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from tests.fields import box, empty, field_from
+from tests.triggers import LIMITS, STRAIGHT, change, goal_at, observe, room
 from uavexp.errors import ConfigError
 from uavexp.mapping.base import DistanceField
 from uavexp.trigger.change import changed_near
 from uavexp.trigger.mcr import Mcr
 from uavexp.trigger.ssp import Ssp
 from uavexp.trigger.tbr import Tbr
-from uavexp.types import Decision, Goal, Limits, MapUpdate, Observation, Reference, State, Trajectory
-
-LIMITS = Limits(
-    max_speed_mps=2.5, max_acceleration_mps2=2.5, max_body_rate_radps=2.0, body_size_m=(0.32, 0.32, 0.12)
-)
-# Straight along x at 1 m/s, y = 2.05, z = 1.05, from t = 1 s to 6 s.
-STRAIGHT = Trajectory(
-    breaks_s=np.array([1.0, 6.0]),
-    coefficients=np.array([[[0.5, 2.05, 1.05], [1.0, 0.0, 0.0]]]),
-    at_rest=False,
-)
-
-
-def room(*boxes: tuple[tuple[float, ...], tuple[float, ...]]) -> DistanceField:
-    grid = empty((7.0, 4.0, 2.0))
-    for low, high in boxes:
-        box(grid, low, high)
-    return field_from(grid, max_distance_m=2.0)
-
-
-def change(before: DistanceField, after: DistanceField, first_seen: bool = False) -> MapUpdate:
-    voxel = np.flatnonzero(before.distance != after.distance).astype(np.int32)
-    return MapUpdate(
-        time_s=0.0,
-        voxel=voxel,
-        old_distance_m=before.distance.ravel()[voxel],
-        new_distance_m=after.distance.ravel()[voxel],
-        first_seen=np.full(len(voxel), first_seen),
-        occupied=after.state.ravel()[voxel] == 2,
-    )
-
-
-def goal_at(x: float) -> Goal:
-    return Goal(position_m=np.array([x, 2.05, 1.05]), is_target=False, score=0.0)
-
-
-def observe(
-    field: DistanceField,
-    update: MapUpdate,
-    time_s: float = 1.5,
-    goal: Goal | None = None,
-    best: Goal | None = None,
-) -> Observation:
-    zero = np.zeros(3)
-    return Observation(
-        time_s=time_s,
-        state=State(
-            position_m=zero, velocity_mps=zero, quaternion_wxyz=np.array([1.0, 0, 0, 0]), body_rate_radps=zero
-        ),
-        reference=Reference(position_m=zero, velocity_mps=zero, acceleration_mps2=zero, yaw_rad=0.0),
-        trajectory=STRAIGHT,
-        field=field,
-        update=update,
-        goal=goal,
-        best_goal=best,
-        target_m=None,
-        flight_bounds_m=np.zeros((2, 3)),
-    )
+from uavexp.types import Decision
 
 
 def decide(policy: Mcr, before: DistanceField, after: DistanceField, **kwargs: object) -> Decision:

@@ -147,12 +147,14 @@ class Frontier:
         now_s = observation.time_s
         self._aside = [entry for entry in self._aside if entry[0] > now_s]
         best, kept = self._choose(observation, self.min_clearance_m)
+        if best is None and kept is None:
+            best = self._last_resort(observation)
         if best is None and kept is None:  # a doorway passed before it was mapped may look too narrow
             best, kept = self._choose(observation, min(self._body_radius_m, self.min_clearance_m))
         bonus = 0.0 if fresh else self.hysteresis
         # Information is left out of `kept`: what that goal promised is being seen on the way.
         if kept is None or (best is not None and (best.is_target or best.score >= kept.score + bonus)):
-            self._current = best or self._last_resort(observation)
+            self._current = best
         return self._current
 
     def _choose(self, observation: Observation, clearance_m: float) -> tuple[Goal | None, Goal | None]:

@@ -10,10 +10,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
 
 from uavexp.types import PlanStatus, Replan, TrialLog
 
-CAUSES = ("map", "goal", "clock")  # counted by name; every other cause is "other"
+# counted by name; every other cause ("retry", "brake") is "other"
+CAUSES = ("map", "goal", "clock", "distance", "collision", "covered", "expired", "arrival")
 
 
 def executed(log: TrialLog) -> tuple[Replan, ...]:
@@ -29,7 +33,7 @@ def failed(log: TrialLog) -> tuple[Replan, ...]:
 
 
 def count_by_cause(replans: Sequence[Replan]) -> dict[str, int]:
-    """Replans per cause, under `map`, `goal`, `clock` and `other`."""
+    """Replans per cause, under its name or `other`."""
     counts = dict.fromkeys((*CAUSES, "other"), 0)
     for replan in replans:
         counts[replan.cause if replan.cause in CAUSES else "other"] += 1
@@ -37,7 +41,7 @@ def count_by_cause(replans: Sequence[Replan]) -> dict[str, int]:
 
 
 def count_useful(replans: Sequence[Replan], useful_change_m: float) -> int:
-    """Replans whose path departs from the old one by more than this, m."""
+    """Replans whose path departs from the old one by more than this, m; the others were wasted."""
     return sum(replan.path_change_m > useful_change_m for replan in replans)
 
 
@@ -52,3 +56,65 @@ def share_near_change(replans: Sequence[Replan]) -> float:
 def rate(count: int, extent: float) -> float:
     """Events per metre or second; NaN over no distance or time."""
     return count / extent if extent > 0.0 else float("nan")
+
+
+@dataclass(frozen=True, slots=True)
+class Blocked:
+    """One episode in which the flown trajectory was blocked, and what became of it."""
+
+    first_s: float  # the ESDF update that showed it
+    until_s: float  # the first update without it, or the contact; inf: the flight ended before either
+    answer_s: float  # time of the first planning request in between; NaN: none
+    contact: bool  # whether it ended by contact
+
+
+def blocked_episodes(log: TrialLog) -> tuple[Blocked, ...]:
+    """Episodes in which what was left of the flown trajectory led through a mapped obstacle.
+
+    A trajectory is blocked at an ESDF update when its least mapped distance from there on, the
+    stop behind its end included, is below the radius of the body's circle. An episode is a
+    maximal run of blocked updates, whatever plan is flown meanwhile. It is answered by the
+    first planning request from its first update on and before its end, whatever the policy's
+    cause was, and whether it brought a plan or, failing, stopped the vehicle. All policies
+    are judged by the same map and threshold, none by its own.
+    """
+    blocked = np.concatenate([[False], log.remaining_clearance_m < log.body_radius_m, [False]])
+    edges = np.flatnonzero(blocked[1:] != blocked[:-1])
+    update_s = np.append(log.tick_s, math.inf)
+    return tuple(
+        _episode(log, float(update_s[first]), float(update_s[end]))
+        for first, end in zip(edges[::2], edges[1::2], strict=True)
+    )
+
+
+def _episode(log: TrialLog, first_s: float, clear_s: float) -> Blocked:
+    contact_s = min((c.start_s for c in log.contacts if first_s <= c.start_s < clear_s), default=math.inf)
+    until_s = min(clear_s, contact_s)
+    requests_s = [replan.time_s for replan in log.replans if first_s <= replan.time_s < until_s]
+    return Blocked(first_s, until_s, min(requests_s, default=math.nan), contact_s < clear_s)
+
+
+def blocked_delays(log: TrialLog) -> dict[str, int | float]:
+    """How fast blocked trajectories were answered; all NaN for a log that did not measure it.
+
+    Returns:
+        `blocked_episodes`, their number; `blocked_delay_s`, mean time from the first update of
+        an answered one to its answer (0: in the same update; NaN: none was answered);
+        `blocked_unanswered`, those that a contact or the flight's end closed before any
+        request; `blocked_cleared`, those that ended by themselves: the map changed back, the
+        place was passed without contact, or the safety role stopped the vehicle.
+        The delay leaves out unanswered episodes: read it beside their number.
+    """
+    if math.isnan(log.body_radius_m):
+        names = ("blocked_episodes", "blocked_delay_s", "blocked_unanswered", "blocked_cleared")
+        return dict.fromkeys(names, math.nan)
+    episodes = blocked_episodes(log)
+    delays_s = [item.answer_s - item.first_s for item in episodes if not math.isnan(item.answer_s)]
+    silent = [item for item in episodes if math.isnan(item.answer_s)]
+    unanswered = sum(item.contact or math.isinf(item.until_s) for item in silent)
+    return {
+        "blocked_episodes": len(episodes),
+        "blocked_delay_s": sum(delays_s) / len(delays_s) if delays_s else math.nan,
+        "blocked_unanswered": unanswered,
+        "blocked_cleared": len(silent) - unanswered,
+    }

@@ -80,6 +80,7 @@ def _replanning(log: TrialLog, useful_change_m: float) -> Metrics:
         "replans_per_m": replanning.rate(len(replans), path.path_length_m(log)),
         "replans_per_s": replanning.rate(len(replans), path.completion_time_s(log)),
         "replans_near_change_share": replanning.share_near_change(replans),
+        **replanning.blocked_delays(log),
     }
 
 

@@ -1,0 +1,48 @@
+"""Replanning on a collision check: when what is left of the trajectory meets a mapped obstacle.
+
+The safety check of Fast-Planner (Zhou et al. 2019, everything within 6 m), FUEL and
+EGO-Planner (Zhou et al. 2021, the first two thirds of a local trajectory): sample the
+trajectory on the inflated map of this moment. Unlike `mcr` it remembers nothing of the
+clearance that the plan was made with.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from uavexp.errors import require_positive
+from uavexp.mapping.base import DistanceField
+from uavexp.trigger.validity import clearance_ahead_m, comes_near, ends_within, is_flown
+from uavexp.types import Decision, Limits, Observation, Trajectory
+
+
+@dataclass(slots=True, kw_only=True)
+class CollisionCheck:
+    """Replans when the path within `horizon_s` is nearer than `clearance_m`, and before a frontier."""
+
+    clearance_m: float = 0.23
+    horizon_s: float = 10.0
+    arrival_s: float = 0.5
+    _trajectory: Trajectory | None = field(init=False, repr=False, default=None)
+
+    def __post_init__(self) -> None:
+        require_positive(clearance_m=self.clearance_m, horizon_s=self.horizon_s, arrival_s=self.arrival_s)
+
+    def reset(self, limits: Limits) -> None:
+        """Begin a trial."""
+        self._trajectory = None
+
+    def planned(self, trajectory: Trajectory, field: DistanceField) -> None:
+        """Watch the new plan."""
+        self._trajectory = trajectory
+
+    def decide(self, observation: Observation) -> Decision:
+        """Replan on a collision ahead, or on arrival."""
+        trajectory, now_s = self._trajectory, observation.time_s
+        if not is_flown(trajectory, now_s):
+            return Decision(replan=False)
+        ahead_m = clearance_ahead_m(trajectory, observation.field, now_s, self.horizon_s)
+        if comes_near(ahead_m, self.clearance_m):
+            return Decision(replan=True, cause="collision")
+        arrival = ends_within(trajectory, observation.goal, now_s, self.arrival_s)
+        return Decision(replan=arrival, cause="arrival" if arrival else "")

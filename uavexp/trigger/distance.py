@@ -1,0 +1,58 @@
+"""Replanning by distance: after every so many metres, whatever the map says.
+
+Receding horizon with a fixed execution length; the DistanceController of Nav2 (Macenski
+et al. 2020) is this policy for ground robots.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from uavexp.errors import require_positive
+from uavexp.geometry import evaluate, polyline_length_m
+from uavexp.mapping.base import DistanceField
+from uavexp.trigger.validity import ends_within, is_flown
+from uavexp.types import Decision, Limits, Observation, Trajectory
+
+_SAMPLE_S = 0.02  # at 2.5 m/s half a voxel
+
+
+@dataclass(slots=True, kw_only=True)
+class Distance:
+    """Replans once `distance_m` of the plan are flown, and `arrival_s` before a frontier."""
+
+    distance_m: float = 1.0
+    arrival_s: float = 0.5
+    _trajectory: Trajectory | None = field(init=False, repr=False, default=None)
+
+    def __post_init__(self) -> None:
+        require_positive(distance_m=self.distance_m, arrival_s=self.arrival_s)
+
+    def reset(self, limits: Limits) -> None:
+        """Begin a trial."""
+        self._trajectory = None
+
+    def planned(self, trajectory: Trajectory, field: DistanceField) -> None:
+        """Begin to measure along the new plan."""
+        self._trajectory = trajectory
+
+    def decide(self, observation: Observation) -> Decision:
+        """Replan when the distance is flown, or on arrival."""
+        trajectory, now_s = self._trajectory, observation.time_s
+        if not is_flown(trajectory, now_s):
+            return Decision(replan=False)
+        score = flown_m(trajectory, now_s) / self.distance_m
+        if score >= 1.0:
+            return Decision(replan=True, cause="distance", score=score)
+        arrival = ends_within(trajectory, observation.goal, now_s, self.arrival_s)
+        return Decision(replan=arrival, cause="arrival" if arrival else "", score=score)
+
+
+def flown_m(trajectory: Trajectory, now_s: float) -> float:
+    """Length of a trajectory from its start until now, m: of the reference, free of estimation noise."""
+    end_s = min(max(now_s, trajectory.start_s), trajectory.end_s)
+    count = 1 + math.ceil((end_s - trajectory.start_s) / _SAMPLE_S)
+    return polyline_length_m(evaluate(trajectory, np.linspace(trajectory.start_s, end_s, count))[0])

@@ -1,0 +1,67 @@
+"""Replanning as Nav2 does (Macenski et al. 2020): when the path is invalid, old, or the goal is new.
+
+The behaviour tree "replanning only if path becomes invalid": PathExpiringTimer, IsPathValid
+and GlobalUpdatedGoal, any of which asks for a new path.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from uavexp.errors import require_non_negative, require_positive
+from uavexp.mapping.base import DistanceField
+from uavexp.trigger.validity import clearance_ahead_m, comes_near, ends_within, is_flown, is_older
+from uavexp.types import Decision, Limits, Observation, Trajectory
+
+
+@dataclass(slots=True, kw_only=True)
+class Expiry:
+    """Replans when the plan is invalid, expired or its goal replaced, and before a frontier."""
+
+    expiry_s: float = 10.0
+    clearance_m: float = 0.23
+    horizon_s: float = 10.0
+    goal_updated: bool = True
+    arrival_s: float = 0.5
+    _trajectory: Trajectory | None = field(init=False, repr=False, default=None)
+
+    def __post_init__(self) -> None:
+        require_positive(expiry_s=self.expiry_s, horizon_s=self.horizon_s, arrival_s=self.arrival_s)
+        require_non_negative(clearance_m=self.clearance_m)
+
+    def reset(self, limits: Limits) -> None:
+        """Begin a trial."""
+        self._trajectory = None
+
+    def planned(self, trajectory: Trajectory, field: DistanceField) -> None:
+        """Watch the new plan; its timer starts when it takes effect."""
+        self._trajectory = trajectory
+
+    def decide(self, observation: Observation) -> Decision:
+        """Replan on the first of collision, new goal, expiry and arrival that holds."""
+        if not is_flown(self._trajectory, observation.time_s):
+            return Decision(replan=False)
+        cause = self._cause(self._trajectory, observation)
+        score = (observation.time_s - self._trajectory.start_s) / self.expiry_s
+        return Decision(replan=cause != "", cause=cause, score=score)
+
+    def _cause(self, trajectory: Trajectory, observation: Observation) -> str:
+        now_s = observation.time_s
+        ahead_m = clearance_ahead_m(trajectory, observation.field, now_s, self.horizon_s)
+        if comes_near(ahead_m, self.clearance_m):
+            return "collision"
+        if self.goal_updated and _is_another_goal(observation):
+            return "goal"
+        if is_older(trajectory, now_s, self.expiry_s):
+            return "expired"
+        return "arrival" if ends_within(trajectory, observation.goal, now_s, self.arrival_s) else ""
+
+
+def _is_another_goal(observation: Observation) -> bool:
+    """Whether g* is not the goal flown to: any difference counts, as in Nav2."""
+    flown, best = observation.goal, observation.best_goal
+    if flown is None or best is None:
+        return False
+    return not np.array_equal(flown.position_m, best.position_m)

@@ -1,0 +1,93 @@
+"""Replanning when the frontier flown to has been seen: FUEL's state machine (Zhou et al. 2021).
+
+FUEL replans on any of four events; each is a parameter here and can be switched off:
+
+- collision: the rest of the trajectory meets a mapped obstacle (its safety timer);
+- arrival: less than `arrival_s` of the trajectory is left (its `thresh_replan1`, 0.5 s);
+- covered: after `min_age_s` (`thresh_replan2`, 0.5 s), a share of what made the goal worth
+  flying to has been seen meanwhile (`min_view_finish_fraction`, 0.2);
+- clock: the plan is `period_s` old (`thresh_replan3`, 1.5 s).
+
+FUEL counts the cells of every frontier cluster that are frontier no longer; here it is the
+unknown voxels within `neighbourhood_m` of the goal flown to, the information that the
+explorer scored it by [ours]. The same test with the period switched off is the "gain has
+gone" rule of next-best-view planners (Bircher et al. 2016).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from uavexp.errors import require, require_non_negative, require_positive
+from uavexp.mapping.base import DistanceField
+from uavexp.trigger.validity import (
+    clearance_ahead_m,
+    comes_near,
+    ends_within,
+    is_flown,
+    is_older,
+    unknown_count,
+)
+from uavexp.types import Decision, Limits, Observation, Trajectory
+
+
+@dataclass(slots=True, kw_only=True)
+class FrontierCovered:
+    """Replans when the frontier is covered, on a collision ahead, on arrival, and by the clock."""
+
+    covered_share: float = 0.2
+    neighbourhood_m: float = 1.0
+    min_age_s: float = 0.5
+    period_s: float = 1.5
+    clearance_m: float = 0.23
+    horizon_s: float = 10.0
+    arrival_s: float = 0.5
+    _trajectory: Trajectory | None = field(init=False, repr=False, default=None)
+    _at_plan: DistanceField | None = field(init=False, repr=False, default=None)
+
+    def __post_init__(self) -> None:
+        require(
+            0.0 < self.covered_share <= 1.0,
+            f"covered_share must be > 0 and <= 1 (1: never), got {self.covered_share}",
+        )
+        require_positive(
+            neighbourhood_m=self.neighbourhood_m, horizon_s=self.horizon_s, arrival_s=self.arrival_s
+        )
+        require_non_negative(min_age_s=self.min_age_s, period_s=self.period_s, clearance_m=self.clearance_m)
+
+    def reset(self, limits: Limits) -> None:
+        """Begin a trial."""
+        self._trajectory, self._at_plan = None, None
+
+    def planned(self, trajectory: Trajectory, field: DistanceField) -> None:
+        """Keep what was known when the plan was made."""
+        self._trajectory, self._at_plan = trajectory, field.copy()
+
+    def decide(self, observation: Observation) -> Decision:
+        """Replan on the first of collision, arrival, cover and clock that holds."""
+        if not is_flown(self._trajectory, observation.time_s):
+            return Decision(replan=False)
+        score = self._covered_share(observation) / self.covered_share
+        cause = self._cause(self._trajectory, observation, score)
+        return Decision(replan=cause != "", cause=cause, score=score)
+
+    def _cause(self, trajectory: Trajectory, observation: Observation, score: float) -> str:
+        now_s = observation.time_s
+        ahead_m = clearance_ahead_m(trajectory, observation.field, now_s, self.horizon_s)
+        if comes_near(ahead_m, self.clearance_m):
+            return "collision"
+        if ends_within(trajectory, observation.goal, now_s, self.arrival_s):
+            return "arrival"
+        if score > 1.0 and is_older(trajectory, now_s, self.min_age_s):
+            return "covered"
+        aged = self.period_s > 0.0 and is_older(trajectory, now_s, self.period_s)
+        return "clock" if aged else ""
+
+    def _covered_share(self, observation: Observation) -> float:
+        """Share of what was unknown around the frontier at the plan that has been seen since."""
+        goal = observation.goal
+        if self._at_plan is None or goal is None or goal.is_target:  # the target is no frontier
+            return 0.0
+        before = unknown_count(self._at_plan, goal.position_m, self.neighbourhood_m)
+        now = unknown_count(observation.field, goal.position_m, self.neighbourhood_m)
+        return 1.0 - now / before if before else 0.0
