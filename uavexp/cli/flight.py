@@ -59,7 +59,9 @@ def check_world(cell: Cell, seed: int) -> None:
     """
     from uavexp.seeding import Stream, generator
 
-    build(cell.config).world.generate(generator(seed, Stream.WORLD))
+    parts = build(cell.config)
+    layout = seed if parts.world_seed is None else parts.world_seed
+    parts.world.generate(generator(layout, Stream.WORLD))
 
 
 def repeat_command(cell: Cell, seed: int, user_folder: Path | None = None) -> str:

@@ -1,29 +1,62 @@
-"""A trial to fly, and what became of it."""
+"""A trial to fly as a job of a sweep: what goes to the child, and what comes back."""
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from uavexp.cli.composition import Cell
-from uavexp.cli.flight import Trial
+from uavexp.cli.flight import Progress, fly_cell
+from uavexp.cli.outputs import failure_files, trial_files
+from uavexp.sweep.job import Answer, Job
+from uavexp.worlds import world_bytes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Job:
-    """One trial to fly and where its files go."""
+class Task:
+    """One trial to fly; the payload of its job."""
 
     cell: Cell
     seed: int
-    folder: str
+    identity: dict[str, Any]  # what makes it this trial (`outputs.identity`), and the seed
+    version: dict[str, Any]  # code and lock digests
     command: str  # that repeats it
+    worlds: Path  # where worlds are kept that need not be sent again
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Result:
-    """What became of a job."""
+class Flown:
+    """A flown trial as the files that it becomes."""
 
-    job: Job
-    row: dict[str, Any]
-    trial: Trial | None  # None when it raised
-    reason: str = ""
+    files: dict[str, bytes]
+    world: tuple[str, bytes | None]  # digest; content, if it is not kept yet
+    outcome: str
+    success: bool
+    reason: str
+
+
+def fly_task(task: Task, progress: Progress) -> Flown:
+    """Fly one trial and return its files; nothing is written here."""
+    begin_s = time.perf_counter()
+    trial = fly_cell(task.cell, task.seed, progress)
+    wall = {"command": task.command, "wall_trial_s": time.perf_counter() - begin_s}
+    digest = trial.world.digest
+    known = (task.worlds / f"{digest}.npz").exists()
+    return Flown(
+        files=trial_files(trial, {**task.identity, **task.version}, wall),
+        world=(digest, None if known else world_bytes(trial.world)),
+        outcome=str(trial.log.outcome),
+        success=bool(trial.metrics["success"]),
+        reason=trial.log.reason,
+    )
+
+
+def files_of(job: Job, answer: Answer, wall_s: float) -> dict[str, bytes]:
+    """Files that a trial leaves behind, flown or not."""
+    if isinstance(answer.value, Flown):
+        return answer.value.files
+    task: Task = job.payload
+    wall = {"command": task.command, "wall_trial_s": wall_s}
+    return failure_files(answer, {**task.identity, **task.version}, wall)

@@ -1,123 +1,189 @@
-"""Flies the trials of a command one after another and writes what they leave behind."""
+"""Flies the trials of a command that are not there yet and leaves a study folder."""
 
 from __future__ import annotations
 
+import contextlib
+import multiprocessing
+import platform
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator, Sequence
+from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import uavexp
+from uavexp.cli import kernels
 from uavexp.cli.composition import Command
-from uavexp.cli.flight import check_world, fly_cell, repeat_command
-from uavexp.cli.job import Job, Result
-from uavexp.cli.outputs import folder_name, laps, output_folder, reason_of, write_failure, write_trial
-from uavexp.cli.rows import failed_row, flown_row
+from uavexp.cli.flight import check_world, fly_cell
+from uavexp.cli.folders import folder_of, opened
+from uavexp.cli.head_start import PRELOAD
+from uavexp.cli.job import Task, files_of, fly_task
+from uavexp.cli.plan import Plan, plan_of
+from uavexp.cli.runner import Runner, cores, read_runner
 from uavexp.cli.terminal import Terminal
 from uavexp.errors import ConfigError, RecordError, UavexpError
-from uavexp.kernel_cache import has_kernels
-from uavexp.records import code_digest, lock_digest
-from uavexp.table import TABLE, write_table
+from uavexp.records import canonical_json, write_text
+from uavexp.study import RUN, STUDY, collect, read_runs, study_text
+from uavexp.sweep.faults import failure, reason_of
+from uavexp.sweep.folder import put_trial, put_world, remove_unfinished, set_aside
+from uavexp.sweep.job import Answer, Done, Job, Status
+from uavexp.sweep.local import Watch, run_local, start_fork_server
 
-Fly = Callable[[Job], Result]
-
-
-def run_all(jobs: Iterable[Job], fly: Fly) -> Iterator[Result]:
-    """Fly every job, one after another, yielding results as they come."""
-    for job in jobs:
-        yield fly(job)
+_WARM_UP_S = 3.0  # simulated: by then every kernel of a flight has been called
 
 
-def jobs_of(command: Command, user_folder: Path | None = None) -> list[Job]:
-    """Cells x seeds, sorted by cell and seed."""
-    return [
-        Job(
-            cell=cell,
-            seed=seed,
-            folder=folder_name(cell, seed),
-            command=repeat_command(cell, seed, user_folder),
-        )
-        for cell in command.cells
-        for seed in sorted(command.seeds)
-    ]
+def execute(
+    command: Command, terminal: Terminal, user_folder: Path | None = None, typed: Sequence[str] = ()
+) -> int:
+    """Fly a command's trials and leave their folder.
 
-
-def execute(command: Command, terminal: Terminal, user_folder: Path | None = None) -> int:
-    """Fly a command's trials and leave an output folder.
+    Args:
+        command: what to fly.
+        terminal: who is told.
+        user_folder: of `--config-dir`.
+        typed: the command line, for the folder's own record of it.
 
     Returns:
-        Exit code: 0, or 1 when some trial raised.
+        Exit code: 0, or 1 when some trial did not run to its end.
 
     Raises:
-        UavexpError: bad input, told before anything was written.
+        UavexpError: bad input, told before anything was written; or a full disk.
     """
-    jobs = jobs_of(command, user_folder)
-    if len(jobs) > 1:
-        _check_worlds(command)
-    run = {"code": code_digest(), "lock": lock_digest()}
-    results: list[Result] = []
-    with (
-        output_folder(command.out, _prefix(command)) as root,
-        terminal.progress(len(jobs), cold=not has_kernels()),
-    ):
+    runner = read_runner(command.runner)
+    folder = folder_of(command)
+    look = partial(plan_of, command, folder, user_folder, accept_other_code=runner.accept_other_code)
+    if runner.dry_run:
+        terminal.listing(look(), folder)
+        return 0
+    with opened(folder):
+        plan = look()
+        if plan.left:
+            _prepare(plan, terminal)
+        return _fly_plan(plan, command, runner, terminal, typed)
+
+
+def _prepare(plan: Plan, terminal: Terminal) -> None:
+    """Start the fork server; while it imports, find out whether every world can be made."""
+    alone = len(plan.jobs) == 1
+    if not kernels.is_compiled():
+        terminal.say("first run: compiling kernels takes about a minute")
+        if not alone:
+            _compile_kernels(plan.left[0])
+    if not alone:
+        start_fork_server([PRELOAD])
+        _check_worlds([job.payload for job in plan.left])
+
+
+def _fly_plan(plan: Plan, command: Command, runner: Runner, terminal: Terminal, typed: Sequence[str]) -> int:
+    folder, began, failed = plan.study.folder, datetime.now(UTC), 0
+    kept = 0
+    with terminal.progress(plan):
         try:
-            for result in run_all(jobs, lambda job: _fly_job(job, root, run, terminal, bool(results))):
-                results.append(result)
-                terminal.finished(result)
-        finally:  # also when interrupted: what has flown keeps its table
-            if results:
-                write_table(root / TABLE, [result.row for result in results])
-    terminal.summary(results, root)
-    return 0 if all(result.trial is not None for result in results) else 1
+            for done in _fly(plan, runner, terminal.watch):
+                if not kept:
+                    _begin(plan)
+                _keep(folder, done)
+                kept += 1
+                failed += done.answer.status is not Status.OK
+                terminal.finished(done)
+        except (KeyboardInterrupt, RecordError):
+            with contextlib.suppress(RecordError):
+                if (folder / STUDY).exists():
+                    collect(folder)
+            terminal.stopped(folder, kept, len(plan.left), again=bool(command.out or command.experiment))
+            raise
+    if not plan.left:
+        _begin(plan)
+    rows = collect(folder)
+    _note_run(folder, {"command": list(typed), "began": began, "flown": kept}, runner)
+    terminal.summary(rows, plan)
+    if command.experiment is not None:
+        from uavexp.report.make import make_report
+
+        terminal.say("writing the report ...")
+        terminal.files(make_report(folder), folder)
+    terminal.say(str(folder))
+    return 1 if failed else 0
 
 
-def _fly_job(job: Job, root: Path, run: dict[str, Any], terminal: Terminal, others_flown: bool) -> Result:
-    """Fly one trial and write its files; a trial that raises costs that trial alone."""
-    begin_s = time.perf_counter()
-    folder = root / job.folder
+def _fly(plan: Plan, runner: Runner, watch: Watch) -> Iterator[Done]:
+    """Fly what is left: each trial in a process of its own, a trial that is all of a command here."""
+    if len(plan.jobs) == 1:
+        return (_fly_here(job, watch) for job in plan.left)
+    workers = min(runner.workers, max(1, len(plan.left)))
+    return run_local(fly_task, plan.left, n_jobs=workers, limits=runner.limits, watch=watch)
+
+
+def _fly_here(job: Job, watch: Watch) -> Done:
+    begin_s = time.monotonic()
     try:
-        trial = fly_cell(job.cell, job.seed, terminal.flying(job))
-        wall_s = time.perf_counter() - begin_s
-        _make_folder(folder)
-        write_trial(trial, folder, run, _wall(job, wall_s))
+        answer = Answer(status=Status.OK, value=fly_task(job.payload, partial(watch, job)))
+    except UavexpError:
+        raise  # bad input, and nothing is written yet
     except Exception as error:
-        if isinstance(error, RecordError) or (isinstance(error, UavexpError) and not others_flown):
-            raise  # a full disk; or bad input, and nothing is written yet
-        wall_s = time.perf_counter() - begin_s
-        _make_folder(folder)
-        write_failure(job.cell, job.seed, folder, run, _wall(job, wall_s), error)
-        row = failed_row(job.cell, job.seed, wall_s, job.folder)
-        return Result(job=job, row=row, trial=None, reason=reason_of(error))
-    row = flown_row(trial, laps(trial), wall_s, job.folder)
-    return Result(job=job, row=row, trial=trial, reason=trial.log.reason)
+        answer = failure(error)
+    return Done(job=job, answer=answer, wall_s=time.monotonic() - begin_s)
 
 
-def _make_folder(folder: Path) -> None:
-    try:
-        folder.mkdir(exist_ok=True)
-    except OSError as error:
-        raise RecordError(f"{folder}: cannot be made ({error.strerror})") from error
+def _begin(plan: Plan) -> None:
+    """Say what the folder is about, and put away what was found broken in it."""
+    folder = plan.study.folder
+    remove_unfinished(folder)
+    for name in plan.stock.damaged:
+        set_aside(folder, name)
+    write_text(folder / STUDY, study_text(plan.study))
 
 
-def _wall(job: Job, wall_s: float) -> dict[str, Any]:
-    return {"command": job.command, "wall_trial_s": wall_s}
+def _keep(folder: Path, done: Done) -> None:
+    """Write a trial; its world first, so that the record vouches for it."""
+    if done.answer.status is Status.OK:
+        digest, data = done.answer.value.world
+        if data is not None:
+            put_world(folder, digest, data)
+    put_trial(folder, done.job.name, files_of(done.job, done.answer, done.wall_s))
 
 
-def _check_worlds(command: Command) -> None:
+def _note_run(folder: Path, run: dict[str, Any], runner: Runner) -> None:
+    """Add this run to the folder's own history."""
+    began = run.pop("began")
+    run |= {
+        "began": began.isoformat(timespec="seconds"),
+        "wall_s": (datetime.now(UTC) - began).total_seconds(),
+        "backend": runner.backend,
+        "n_jobs": runner.workers,
+        "uavexp": uavexp.__version__,
+        "python": platform.python_version(),
+        "machine": f"{platform.system()} {platform.machine()}, {cores()} cores",
+    }
+    write_text(folder / RUN, canonical_json({"runs": [*read_runs(folder), run]}) + "\n")
+
+
+def _check_worlds(tasks: Sequence[Task]) -> None:
     """Make each distinct world once, so that a bad one is told before the first flight."""
-    seed = min(command.seeds)
     checked: list[Any] = []
-    for cell in command.cells:
-        if cell.config["world"] not in checked:
-            checked.append(cell.config["world"])
+    for task in tasks:
+        world = task.cell.config["world"], task.cell.config["world_seed"]
+        if world not in checked:
+            checked.append(world)
             try:
-                check_world(cell, seed)
+                check_world(task.cell, task.seed)
             except UavexpError:
                 raise
             except Exception as error:
-                raise ConfigError(f"world={cell.options['world']}: {reason_of(error)}") from error
+                raise ConfigError(f"world={task.cell.options['world']}: {reason_of(error)}") from error
 
 
-def _prefix(command: Command) -> str:
-    names = dict.fromkeys(cell.strategy for cell in command.cells)
-    worlds = dict.fromkeys(cell.options["world"] for cell in command.cells)
-    return "-".join([*names, *worlds])[:60]
+def _compile_kernels(job: Job) -> None:
+    """Fly the first seconds of a trial in a process of its own, which leaves its kernels in the cache."""
+    process = multiprocessing.get_context("spawn").Process(target=_warm_up, args=(job.payload,), daemon=True)
+    process.start()
+    process.join()
+
+
+def _warm_up(task: Task) -> None:
+    def stop(time_s: float, _: str) -> None:
+        if time_s >= _WARM_UP_S:
+            raise SystemExit
+
+    fly_cell(task.cell, task.seed, stop)

@@ -2,26 +2,37 @@
 
 from __future__ import annotations
 
+import threading
 import time
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-from rich.table import Table
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 
+from uavexp.cli.summary import cell_table, trial_table
 from uavexp.records import PICTURE
+from uavexp.study import TRIALS
 
 if TYPE_CHECKING:
-    from uavexp.cli.flight import Progress as FlightProgress
-    from uavexp.cli.job import Job, Result
+    from uavexp.cli.plan import Plan
+    from uavexp.sweep.job import Done, Job
+    from uavexp.table import Row
 
 _PATIENCE_S = 2.0  # nothing is shown for work that is done sooner
 _PLAIN_PERIOD_S = 10.0  # between lines when the output is no terminal
+_MOST_LINES = 50  # so many trials get a line each
 _MAX_ROWS = 60
+_MAX_FAILURES = 20
 _TABLE_WIDTH = 150
 
 
@@ -32,16 +43,28 @@ class Terminal:
         # folders and commands must survive a pipe unbroken
         self._console = console or Console(highlight=False, soft_wrap=True)
         self._bar: Progress | None = None
+        self._lock = threading.Lock()  # flights report from several threads
         self._total = self._done = self._successes = 0
-        self._last_s = 0.0
+        self._begin_s = self._last_s = time.monotonic()
+
+    def say(self, line: str) -> None:
+        """Print one line as it is."""
+        self._last_s = time.monotonic()
+        self._console.print(line, markup=False)
+
+    def listing(self, plan: Plan, folder: Path) -> None:
+        """Print what would be flown."""
+        self._announce(plan, "to fly")
+        for job in plan.left:
+            self.say(f"{job.name}  {job.payload.command}")
+        self.say(str(folder))
 
     @contextmanager
-    def progress(self, total: int, *, cold: bool = False) -> Iterator[None]:
-        """Show progress over `total` trials while the block runs; `cold`: no kernel is compiled yet."""
-        self._total = total
-        what = "1 trial" if total == 1 else f"{total} trials"
-        self._say(f"flying {what}" + (" (first run: compiling kernels takes about a minute)" if cold else ""))
-        if not self._console.is_terminal:
+    def progress(self, plan: Plan) -> Iterator[None]:
+        """Show progress over the trials that are left while the block runs."""
+        self._total, self._begin_s = len(plan.left), time.monotonic()
+        self._announce(plan, "flying")
+        if not self._console.is_terminal or not self._total:
             yield
             return
         columns = (
@@ -49,105 +72,93 @@ class Terminal:
             BarColumn(),
             MofNCompleteColumn(),
             TimeElapsedColumn(),
+            TimeRemainingColumn(),
             TextColumn("{task.fields[words]}"),
         )
         with Progress(*columns, console=self._console, transient=True) as self._bar:
-            self._bar.add_task("trials", total=total, words="")
+            self._bar.add_task("trials", total=self._total, words="")
             yield
         self._bar = None
 
-    def flying(self, job: Job) -> FlightProgress:
-        """Callback for the progress of one flight."""
-        name = f"{job.cell.strategy} seed {job.seed}"
-
-        def show(time_s: float, words: str) -> None:
-            line = f"{name}: {time_s:.0f} s flown, {words}"
+    def watch(self, job: Job, time_s: float, words: str) -> None:
+        """Note the progress of one flight."""
+        line = f"{job.label}: {time_s:.0f} s flown, {words}"
+        with self._lock:
             if self._bar is not None:
                 self._bar.update(self._bar.task_ids[0], words=line)
             elif time.monotonic() - self._last_s > (_PLAIN_PERIOD_S if self._done else _PATIENCE_S):
-                self._say(line)
+                self.say(line)
 
-        return show
-
-    def finished(self, result: Result) -> None:
+    def finished(self, done: Done) -> None:
         """Note that one trial has ended."""
-        self._done += 1
-        self._successes += bool(result.row["success"])
-        if self._bar is not None:
-            self._bar.update(self._bar.task_ids[0], completed=self._done)
-            self._bar.update(self._bar.task_ids[0], description=f"trials ({self._successes} succeeded)")
-        elif self._total > 1:
-            job = result.job
-            self._say(
-                f"[{self._done}/{self._total}] {job.cell.strategy} seed {job.seed}: {result.row['outcome']}"
-                + (f" ({result.reason})" if result.reason else "")
-            )
+        flown = done.answer.value
+        outcome, reason = (flown.outcome, flown.reason) if flown else ("error", done.answer.reason)
+        with self._lock:
+            self._done += 1
+            self._successes += bool(flown and flown.success)
+            if self._bar is not None:
+                rate = f"trials ({self._successes} succeeded, {self._successes / self._done:.0%})"
+                self._bar.update(self._bar.task_ids[0], completed=self._done, description=rate)
+            elif 1 < self._total <= _MOST_LINES:
+                why = f" ({reason})" if reason else ""
+                self.say(f"[{self._done}/{self._total}] {done.job.label}: {outcome}{why}")
+            elif self._total > 1 and time.monotonic() - self._last_s > _PLAIN_PERIOD_S:
+                self.say(self._standing())
 
-    def summary(self, results: Sequence[Result], root: Path) -> None:
-        """Print the table of trials, how to repeat them, their pictures and, last, the folder."""
+    def stopped(self, folder: Path, flown: int, total: int, *, again: bool) -> None:
+        """Say what an interrupted command leaves and how to go on."""
+        if not flown:
+            return
+        how = "the same command" if again else f"the same command with out={folder}"
+        self.say(f"stopped: {flown} of {total} trials are kept in {folder}; {how} flies the others")
+
+    def summary(self, rows: Sequence[Row], plan: Plan) -> None:
+        """Print the tables of trials, how to repeat them, and their pictures.
+
+        Args:
+            rows: of `trials.parquet`.
+            plan: what was asked; only its trials are shown.
+        """
+        commands = {job.name: job.payload.command for job in plan.jobs}
+        rows = [row for row in rows if row["trial"] in commands]
+        few = len(rows) <= _MAX_ROWS
         # as wide as it needs: a cut-off number is worse than a wrapped line
-        Console(file=self._console.file, width=_TABLE_WIDTH).print(_table(results[:_MAX_ROWS]))
-        if len(results) > _MAX_ROWS:
-            self._say(f"... and {len(results) - _MAX_ROWS} more in trials.parquet")
-        for result in results[:_MAX_ROWS]:
-            if result.trial is None:
-                self._say(f"seed {result.job.seed} raised: {result.reason}")
-            elif result.reason:
-                self._say(f"seed {result.job.seed} ended {result.row['outcome']}: {result.reason}")
-        for result in results[:_MAX_ROWS]:
-            self._say(f"repeat:  {result.job.command}")
-            if result.trial is not None:
-                self._say(f"picture: {root / result.job.folder / PICTURE}")
-        self._say(str(root))
+        wide = Console(file=self._console.file, width=_TABLE_WIDTH)
+        wide.print(trial_table(rows) if few else cell_table(rows, list(plan.study.axes)))
+        for row in rows if few else [row for row in rows if row["status"] != "ok"][:_MAX_FAILURES]:
+            if row["reason"]:
+                ending = f"ended {row['outcome']}" if row["status"] == "ok" else str(row["status"])
+                self.say(f"{row['strategy']} seed {row['seed']} {ending}: {row['reason']}")
+        for row in rows if few else []:
+            self.say(f"repeat:  {commands[row['trial']]}")
+            if row["status"] == "ok":
+                self.say(f"picture: {plan.study.folder / TRIALS / row['trial'] / PICTURE}")
 
-    def _say(self, line: str) -> None:
-        self._last_s = time.monotonic()
-        self._console.print(line, markup=False)
+    def files(self, paths: Sequence[Path], folder: Path) -> None:
+        """Print where a report's files are; tables and figures by their folder."""
+        for place in dict.fromkeys(path if path.parent == folder else path.parent for path in paths):
+            self.say(f"report:  {place}")
 
+    def _announce(self, plan: Plan, doing: str) -> None:
+        finished = len(plan.jobs) - len(plan.left)
+        words = [f"{doing} {_count(len(plan.left))}" if plan.left else "nothing is left to fly"]
+        words += [f"{_count(finished)} finished before"] if finished else []
+        words += [f"{_count(plan.again)} failed before and fly again"] if plan.again else []
+        self.say("; ".join(words))
+        for name, what in plan.stock.damaged.items():
+            self.say(f"damaged, set aside: {name} ({what})")
 
-def _table(results: Sequence[Result]) -> Table:
-    table = Table(title=None, box=None, pad_edge=False, header_style="bold")
-    for name in ("strategy", "world", "seed", "outcome"):
-        table.add_column(name, no_wrap=True)
-    for name in (
-        "contacts",
-        "time s",
-        "path m",
-        "shortest m",
-        "replans",
-        "clearance m",
-        "tracking m",
-        "wall s",
-    ):
-        table.add_column(name, justify="right", no_wrap=True)
-    for result in results:
-        row = result.row
-        table.add_row(
-            row["strategy"],
-            row["world"],
-            str(row["seed"]),
-            row["outcome"],
-            _number(row, "collision_count", 0),
-            _number(row, "completion_time_s", 1),
-            _number(row, "path_length_m", 1),
-            _number(row, "shortest_path_m", 1),
-            _replans(result),
-            _number(row, "min_clearance_m", 2),
-            _number(row, "tracking_error_m", 3),
-            _number(row, "wall_trial_s", 1),
+    def _standing(self) -> str:
+        left_s = (time.monotonic() - self._begin_s) / self._done * (self._total - self._done)
+        return (
+            f"[{self._done}/{self._total}] {self._successes / self._done:.0%} succeeded, "
+            f"about {_duration(left_s)} left"
         )
-    return table
 
 
-def _number(row: dict[str, Any], name: str, digits: int) -> str:
-    value = row.get(name)
-    return "-" if value is None else f"{value:.{digits}f}"
+def _count(trials: int) -> str:
+    return "1 trial" if trials == 1 else f"{trials} trials"
 
 
-def _replans(result: Result) -> str:
-    """Replans with their causes, the first plan apart."""
-    if result.trial is None:
-        return "-"
-    causes = Counter(item.cause for item in result.trial.log.replans[1:] if item.status == "ok")
-    words = ", ".join(f"{count} {cause}" for cause, count in sorted(causes.items()))
-    return f"{result.row['replans']}" + (f" ({words})" if words else "")
+def _duration(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 100.0 else f"{seconds / 60.0:.0f} min"

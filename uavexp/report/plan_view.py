@@ -24,9 +24,9 @@ MOST_SEGMENTS = 1000  # of the flown path
 SPEED_COLOURS = LinearSegmentedColormap.from_list("speed", ["#8CC4EA", "#2F86C1", "#0A2F5C"])
 
 
-def view_m(world: World, log: TrialLog) -> Float:
+def view_m(world: World, *logs: TrialLog) -> Float:
     """Corners (2, 2) of the plan: start, target and everything flown with a margin, inside the world."""
-    places = _visited_m(world, log)[:, :2]
+    places = visited_m(world, *logs)[:, :2]
     bounds_m = world.bounds_m[:, :2]
     lower_m = np.maximum(places.min(axis=0) - MARGIN_M, bounds_m[0])
     upper_m = np.minimum(places.max(axis=0) + MARGIN_M, bounds_m[1])
@@ -35,21 +35,25 @@ def view_m(world: World, log: TrialLog) -> Float:
 
 def draw(axes: Axes, world: World, log: TrialLog, view: Float) -> Normalize:
     """Draw the plan on `axes`; return the scale of the path's colours, m/s."""
-    heights_m = band_m(world)
-    _draw_truth(axes, world, log, heights_m)
-    _draw_mapped(axes, log, heights_m, view)
+    draw_truth(axes, world, visited_m(world, log))
+    _draw_mapped(axes, log, band_m(world), view)
     axes.plot(world.shortest_path[:, 0], world.shortest_path[:, 1], "--", color=style.BLACK, lw=0.9, zorder=4)
     for replan in log.replans:
         points = replan.trajectory_m
         axes.plot(points[:, 0], points[:, 1], color=style.SKY, lw=0.6, alpha=0.6, zorder=3)
     scale = _draw_path(axes, log)
     _draw_events(axes, log)
-    _draw_task(axes, world)
+    draw_task(axes, world)
+    frame(axes, view)
+    return scale
+
+
+def frame(axes: Axes, view: Float) -> None:
+    """Show this part of the plan (2, 2), to scale."""
     axes.set(xlim=view[:, 0], ylim=view[:, 1], aspect="equal", anchor="N", xlabel="x [m]", ylabel="y [m]")
     tick_m = _tick_m(float(np.max(view[1] - view[0])))
     axes.xaxis.set_major_locator(MultipleLocator(tick_m))
     axes.yaxis.set_major_locator(MultipleLocator(tick_m))
-    return scale
 
 
 def _tick_m(extent_m: float) -> float:
@@ -59,10 +63,11 @@ def _tick_m(extent_m: float) -> float:
     return next(step * power for step in (1.0, 2.0, 5.0, 10.0) if step * power >= 0.999 * rough_m)
 
 
-def _visited_m(world: World, log: TrialLog) -> Float:
-    """Places (N, 3) known to be free: start, target, the shortest and the flown path."""
+def visited_m(world: World, *logs: TrialLog) -> Float:
+    """Places (N, 3) known to be free: start, target, the shortest and the flown paths."""
     ends = np.stack([world.start_m, world.target_m])
-    return np.concatenate([ends, world.shortest_path.reshape(-1, 3), log.position_m.reshape(-1, 3)])
+    flown = [log.position_m.reshape(-1, 3) for log in logs]
+    return np.concatenate([ends, world.shortest_path.reshape(-1, 3), *flown])
 
 
 def band_m(world: World) -> tuple[float, float]:
@@ -72,10 +77,17 @@ def band_m(world: World) -> tuple[float, float]:
     return max(height_m - BAND_M, float(lowest_m)), min(height_m + BAND_M, float(highest_m))
 
 
-def _draw_truth(axes: Axes, world: World, log: TrialLog, heights_m: tuple[float, float]) -> None:
+def draw_truth(axes: Axes, world: World, free_m: Float) -> None:
+    """Draw the true obstacles at flight height.
+
+    Args:
+        axes: to draw on.
+        world: the truth.
+        free_m: places (N, 3) known to be free; what does not join up with them is solid.
+    """
     extent_m = float(np.max(world.bounds_m[1, :2] - world.bounds_m[0, :2]))
     cell_m = max(LEAST_CELL_M, extent_m / MOST_CELLS)
-    plan = section.cut(world, heights_m, _visited_m(world, log), cell_m)
+    plan = section.cut(world, band_m(world), free_m, cell_m)
     axes.imshow(
         plan.cells.T,
         cmap=ListedColormap(["#FFFFFF", style.SOLID, style.SURFACE]),
@@ -139,6 +151,7 @@ def marker_size_pt(log: TrialLog) -> float:
     return 7.5 if len(log.replans) < 40 else 5.0
 
 
-def _draw_task(axes: Axes, world: World) -> None:
+def draw_task(axes: Axes, world: World) -> None:
+    """Mark start and target."""
     axes.plot(*world.start_m[:2], "o", color="white", mec=style.BLACK, mew=1.4, ms=8, zorder=6)
     axes.plot(*world.target_m[:2], "*", color=style.YELLOW, mec=style.BLACK, mew=0.9, ms=15, zorder=6)

@@ -37,6 +37,11 @@ CAUSE_MARKS = {
     "map": Mark(ORANGE, "^"),
     "goal": Mark(GREEN, "D"),
     "clock": Mark(PURPLE, "s"),
+    "distance": Mark(SKY, "o"),
+    "collision": Mark(VERMILLION, "X"),
+    "covered": Mark(BLUE, "p"),
+    "expired": Mark(YELLOW, "h"),
+    "arrival": Mark("#8C6D31", "<"),
     "brake": Mark(BLACK, "v"),
 }
 OTHER_MARK = Mark("#606060", "P")
@@ -82,6 +87,7 @@ _SETTINGS: dict[str, object] = {
     "legend.handletextpad": 0.4,
     "legend.columnspacing": 1.4,
     "lines.solid_capstyle": "round",
+    "pdf.fonttype": 42,  # text of a figure stays text in a paper
 }
 
 

@@ -1,0 +1,1 @@
+"""A user's own package: `--config-dir tests/faulty` with UAVEXP_TRUST=tests gives trigger=faulty."""

@@ -1,0 +1,252 @@
+"""Sweeps as a user types them, and everything that may befall one."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import random
+import shutil
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from tests.sweeps import QUICK, assert_same_study, begin, records, run
+from uavexp.paths import PACKAGE
+from uavexp.records import canonical_json, digest, read_record, seal
+from uavexp.study import collect, read_study
+
+STUDY = (*QUICK, "strategy=mcr,tbr", "seed=0:3")
+FAULTY = ("--config-dir", str(PACKAGE.parent / "tests" / "faulty"))
+TRUST = {"UAVEXP_TRUST": "tests"}
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The study, flown by two workers and left alone."""
+    folder = tmp_path_factory.mktemp("undisturbed") / "study"
+    done = run(*STUDY, "runner.n_jobs=2", f"out={folder}")
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+@pytest.fixture
+def copy(undisturbed: Path, tmp_path: Path) -> Path:
+    """The same study, to be damaged."""
+    return Path(shutil.copytree(undisturbed, tmp_path / "study"))
+
+
+def test_one_worker_leaves_what_two_leave(undisturbed: Path, tmp_path: Path) -> None:
+    done = run(*STUDY, "runner.n_jobs=1", f"out={tmp_path / 'one'}")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-1] == str(tmp_path / "one")
+    assert_same_study(tmp_path / "one", undisturbed)
+
+
+def test_a_sweep_killed_at_ten_random_moments_ends_as_if_it_had_not_been(
+    undisturbed: Path, tmp_path: Path
+) -> None:
+    folder, chance = tmp_path / "killed", random.Random(7)
+    kept: dict[str, bytes] = {}
+    for _ in range(10):
+        process = begin(*STUDY, "runner.n_jobs=2", f"out={folder}")
+        assert process.stdout is not None
+        process.stdout.readline()  # "flying ..."
+        if chance.random() < 0.3:
+            process.stdout.readline()  # a trial has ended, another line has come
+        time.sleep(chance.uniform(0.0, 1.0))
+        process.kill()
+        process.communicate()
+        now = records(folder)
+        assert kept.items() <= now.items(), "a recorded trial was lost or changed"
+        kept = now
+    done = run(*STUDY, "runner.n_jobs=2", f"out={folder}")
+    assert done.returncode == 0, done.stderr
+    assert_same_study(folder, undisturbed)
+    assert not list(folder.rglob("*.part"))
+    assert not list(folder.rglob("*.aside-*"))
+
+
+def test_the_same_command_again_flies_nothing_and_changes_nothing(copy: Path, undisturbed: Path) -> None:
+    done = run(*STUDY, f"out={copy}")
+    assert done.returncode == 0, done.stderr
+    assert "nothing is left to fly; 6 trials finished before" in done.stdout
+    assert_same_study(copy, undisturbed)
+
+
+def test_more_seeds_and_strategies_extend_a_study(undisturbed: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "grown"
+    assert run(*QUICK, "strategy=tbr", "seed=0:2", f"out={folder}").returncode == 0
+    done = run(*STUDY, f"out={folder}")
+    assert "flying 4 trials; 2 trials finished before" in done.stdout
+    assert_same_study(folder, undisturbed)
+
+
+def test_damaged_trials_are_found_named_set_aside_and_flown_again(copy: Path, undisturbed: Path) -> None:
+    cut, flipped, unlogged, *_ = sorted((copy / "trials").iterdir())
+    (cut / "record.json").write_bytes((cut / "record.json").read_bytes()[:500])
+    for file in (flipped / "record.json", unlogged / "log.npz"):
+        data = bytearray(file.read_bytes())
+        data[len(data) // 2] ^= 1
+        file.write_bytes(data)
+    done = run(*STUDY, f"out={copy}")
+    assert done.returncode == 0, done.stderr
+    for trial in (cut, flipped, unlogged):
+        assert f"damaged, set aside: {trial.name}" in done.stdout
+        assert trial.with_name(f"{trial.name}.aside-1").is_dir()
+    assert "flying 3 trials; 3 trials finished before" in done.stdout
+    for aside in (copy / "trials").glob("*.aside-1"):
+        shutil.rmtree(aside)
+    assert_same_study(copy, undisturbed)
+
+
+@pytest.mark.parametrize("key", ["code", "lock"])
+def test_trials_of_another_version_are_not_pooled_unasked(copy: Path, key: str) -> None:
+    trial = min((copy / "trials").iterdir())
+    (trial / "record.json").write_text(seal({**read_record(trial), key: "0" * 64}))
+    before = records(copy)
+    done = run(*STUDY, f"out={copy}")
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert "holds 1 trials flown by another version" in done.stderr
+    assert "runner.accept_other_code=true" in done.stderr
+    assert records(copy) == before
+    if key == "code":
+        assert run(*STUDY, f"out={copy}", "runner.accept_other_code=true").returncode == 0
+        assert set(pd.read_parquet(copy / "trials.parquet")["code"].str.startswith("000000")) == {True, False}
+
+
+def test_trials_of_another_schema_are_refused_with_what_to_do(copy: Path) -> None:
+    trial = min((copy / "trials").iterdir())
+    body = {**json.loads((trial / "record.json").read_text()), "schema": 1}
+    body.pop("sha256")
+    (trial / "record.json").write_text(canonical_json({**body, "sha256": digest(body)}))
+    done = run(*STUDY, f"out={copy}", "runner.accept_other_code=true")
+    assert done.returncode == 2
+    assert "schema 1" in done.stderr
+    assert "out=DIR" in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_a_dry_run_lists_what_is_left_and_writes_nothing(copy: Path) -> None:
+    missing = min((copy / "trials").iterdir())
+    shutil.rmtree(missing)
+    before = {item: item.stat().st_mtime_ns for item in copy.rglob("*")}
+    done = run(*STUDY, f"out={copy}", "runner.dry_run=true")
+    assert done.returncode == 0, done.stderr
+    assert "to fly 1 trial; 5 trials finished before" in done.stdout
+    assert [line.split()[0] for line in done.stdout.splitlines() if "-s0-" in line] == [missing.name]
+    assert {item: item.stat().st_mtime_ns for item in copy.rglob("*")} == before
+
+
+def test_a_second_sweep_on_a_folder_is_refused(tmp_path: Path) -> None:
+    first = begin(*STUDY, "runner.n_jobs=1", f"out={tmp_path / 'shared'}")
+    assert first.stdout is not None
+    first.stdout.readline()
+    second = run(*STUDY, f"out={tmp_path / 'shared'}")
+    assert second.returncode == 2
+    assert second.stderr.count("\n") == 1
+    assert f"another command (process {first.pid}) is flying into it" in second.stderr
+    first.kill()
+    first.communicate()
+
+
+def test_a_trial_that_fails_costs_itself_alone_and_is_flown_again(tmp_path: Path) -> None:
+    folder = tmp_path / "study"
+    deeds = "trigger.deed=raise,segfault,kill,hog,sleep,print"
+    typed = (*FAULTY, *QUICK, "trigger=faulty", deeds, "seed=0", f"out={folder}")
+    runner = ("runner.timeout_s=12", "runner.memory_mb=1500")
+    done = run(*typed, *runner, **TRUST)
+    assert done.returncode == 1
+    assert done.stderr == ""
+    trials = pd.read_parquet(folder / "trials.parquet").set_index("p_trigger_deed")
+    assert trials["status"].to_dict() == {
+        "raise": "raised", "segfault": "killed", "kill": "killed",
+        "hog": "memory", "sleep": "hung", "print": "ok"
+    }  # fmt: skip
+    assert set(trials["outcome"][trials["status"] != "ok"]) == {"error"}
+    assert not trials["success"][trials["status"] != "ok"].any()
+    record = read_record(folder / "trials" / trials["trial"]["segfault"])
+    assert "SIGSEGV" in record["reason"]
+    assert any("faulty/policy.py" in frame for frame in record["traceback"])
+    assert str(PACKAGE.parent) not in json.dumps(record)
+    again = run(*typed, "runner.timeout_s=1", "runner.memory_mb=1500", **TRUST)
+    assert "flying 5 trials; 1 trial finished before; 5 trials failed before" in again.stdout
+    assert len(list((folder / "trials").glob("*.aside-1"))) == 5
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_sweep_says_how_to_go_on(number: signal.Signals, tmp_path: Path) -> None:
+    folder = tmp_path / "study"
+    process = begin(*STUDY, "runner.n_jobs=1", f"out={folder}")
+    assert process.stdout is not None
+    while not process.stdout.readline().startswith("[2/6]"):
+        assert process.poll() is None
+    process.send_signal(number)
+    out, error = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert error == "interrupted\n"
+    assert f"of 6 trials are kept in {folder}; the same command flies the others" in out
+    assert len(pd.read_parquet(folder / "trials.parquet")) == len(records(folder)) >= 2
+
+
+@contextlib.contextmanager
+def small_disk(place: Path, size: str) -> Iterator[None]:
+    place.mkdir()
+    made = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", f"size={size}", "none", str(place)], capture_output=True, text=True
+    )
+    if made.returncode != 0:
+        pytest.skip(f"no small disk may be mounted here: {made.stderr.strip()}")
+    try:
+        yield
+    finally:
+        subprocess.run(["umount", "-l", str(place)], check=True)
+
+
+def test_a_full_disk_ends_the_sweep_with_one_line_and_loses_nothing(
+    undisturbed: Path, tmp_path: Path
+) -> None:
+    disk = tmp_path / "disk"
+    with small_disk(disk, "700k"):
+        done = run(*STUDY, "runner.n_jobs=2", f"out={disk / 'study'}")
+        assert done.returncode == 2
+        assert done.stderr.count("\n") == 1
+        assert "No space left on device" in done.stderr
+        kept = records(disk / "study")
+        assert 0 < len(kept) < 6
+        assert kept.items() <= records(undisturbed).items()
+        assert not list((disk / "study").rglob("*.part"))
+        subprocess.run(["mount", "-o", "remount,size=20m", str(disk)], check=True)
+        assert run(*STUDY, f"out={disk / 'study'}").returncode == 0
+        assert_same_study(disk / "study", undisturbed)
+
+
+def test_the_tables_can_be_made_again_from_the_records(copy: Path) -> None:
+    tables = [copy / "trials.parquet", copy / "replans.parquet"]
+    before = [file.read_bytes() for file in tables]
+    for file in tables:
+        file.unlink()
+    rows = collect(copy)
+    assert [file.read_bytes() for file in tables] == before
+    assert [(row["cell"], row["seed"]) for row in rows] == [
+        (cell, seed) for cell in ("mcr", "tbr") for seed in range(3)
+    ]
+
+
+def test_a_study_reads_its_logs_and_worlds_back(undisturbed: Path) -> None:
+    study = read_study(undisturbed)
+    assert study.axes == {"cell": ("mcr", "tbr")}
+    assert study.seeds == (0, 1, 2)
+    row = study.trials.iloc[0]
+    world = study.world(row["world_digest"])
+    assert world.digest == row["world_digest"]
+    log = study.log(row["trial"])
+    assert log.position_m[0] == pytest.approx(world.start_m)
+    requests = study.replans[study.replans["trial"] == row["trial"]]
+    assert list(requests["number"]) == list(range(len(log.replans)))
+    assert list(requests["near_change"]) == [item.near_change for item in log.replans]

@@ -1,0 +1,89 @@
+"""Jobs that end in every way a job can end; importable, as a sweep's children need it."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from uavexp.sweep.job import Report
+
+
+def act(payload: tuple[str, Any], report: Report) -> Any:
+    """Do what the payload says and return its argument's double, if it is a number."""
+    deed, argument = payload
+    report(0.0, "begun")
+    DEEDS[deed](argument)
+    report(1.0, "done")
+    return 2 * argument if isinstance(argument, float) else None
+
+
+def _note(folder: Path) -> None:
+    """Leave word that this process ran: its number."""
+    (folder / str(os.getpid())).touch()
+
+
+def _raise(_: Any) -> None:
+    raise ZeroDivisionError("no such luck")
+
+
+def _segfault(_: Any) -> None:
+    ctypes.string_at(0)
+
+
+def _hog(_: Any) -> None:
+    blocks = [np.ones((64, 1024, 1024)) for _ in range(64)]  # 32 GB, half a GB at a time
+    assert blocks
+
+
+def _hog_a_little(_: Any) -> None:
+    assert np.empty((64, 1024, 1024)).nbytes > 5e8  # address space, not touched
+
+
+def _note_and_sleep(folder: Path) -> None:
+    _note(folder)
+    time.sleep(60.0)
+
+
+def _note_and_spin(folder: Path) -> None:
+    _note(folder)
+    _spin(60.0)
+
+
+def _kill_oneself(_: Any) -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def _spin(seconds: float) -> None:
+    """Hold the interpreter in C code: no Python thread of this process runs meanwhile."""
+    ctypes.PyDLL(None).usleep(int(seconds * 1e6))
+
+
+def _leave(_: Any) -> None:
+    os._exit(3)
+
+
+def _print(_: Any) -> None:
+    os.write(1, b"noise\n")
+    os.write(2, b"noise\n")
+
+
+DEEDS = {
+    "nothing": lambda _: None,
+    "sleep": time.sleep,
+    "spin": _spin,
+    "raise": _raise,
+    "segfault": _segfault,
+    "hog": _hog,
+    "kill": _kill_oneself,
+    "leave": _leave,
+    "print": _print,
+    "hog_a_little": _hog_a_little,
+    "note_and_sleep": _note_and_sleep,
+    "note_and_spin": _note_and_spin,
+}

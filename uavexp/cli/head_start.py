@@ -1,0 +1,32 @@
+"""The fork server started while the command is still composed: both import the same for seconds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from uavexp.cli.options import EXPERIMENT_GROUP, RUNNER_GROUP
+from uavexp.cli.overrides import Setting, expand_seeds
+from uavexp.kernel_cache import has_kernels
+from uavexp.sweep.local import start_fork_server
+
+PRELOAD = "uavexp.cli.preload"
+
+
+def give_head_start(settings: Sequence[Setting]) -> None:
+    """Start the fork server if these settings will need it and it has kernels to load.
+
+    Raises:
+        ConfigError: bad seeds.
+    """
+    if has_kernels() and _fly_many(settings):
+        start_fork_server([PRELOAD])
+
+
+def _fly_many(settings: Sequence[Setting]) -> bool:
+    values = {setting.key: setting.values for setting in settings}
+    if values.get(f"{RUNNER_GROUP}.dry_run", (False,)) != (False,):
+        return False
+    seeds = expand_seeds(values.pop("seed")) if "seed" in values else (0,)
+    many = len(seeds) * math.prod(len(item) for item in values.values()) > 1
+    return many or values.get(EXPERIMENT_GROUP, (None,)) != (None,)

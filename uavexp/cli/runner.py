@@ -1,0 +1,66 @@
+"""How trials are run: the `runner` group, checked. No part of what is flown."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, get_type_hints
+
+from uavexp.errors import require, require_option
+from uavexp.parameters import check_value
+from uavexp.sweep.job import Limits
+
+
+class Backend(StrEnum):
+    """Where the processes are."""
+
+    LOCAL = "local"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Runner:
+    """The parameters of `conf/runner/*.yaml`."""
+
+    backend: str
+    n_jobs: int
+    timeout_s: float
+    memory_mb: float
+    dry_run: bool
+    accept_other_code: bool
+
+    def __post_init__(self) -> None:
+        require_option("runner.backend", self.backend, Backend)
+        require(self.n_jobs == -1 or self.n_jobs >= 1, f"runner.n_jobs must be -1 or >= 1, got {self.n_jobs}")
+        for name in ("timeout_s", "memory_mb"):
+            value = getattr(self, name)
+            require(0.0 < value < float("inf"), f"runner.{name} must be > 0 and finite, got {value:g}")
+
+    @property
+    def workers(self) -> int:
+        """Trials at a time."""
+        return self.n_jobs if self.n_jobs > 0 else cores()
+
+    @property
+    def limits(self) -> Limits:
+        """What one trial may take."""
+        return Limits(timeout_s=self.timeout_s, memory_mb=self.memory_mb)
+
+
+def read_runner(tree: Mapping[str, Any]) -> Runner:
+    """The runner of a composed configuration.
+
+    Raises:
+        ConfigError: a value of the wrong type or out of range.
+    """
+    kinds = get_type_hints(Runner)
+    return Runner(**{name: check_value(f"runner.{name}", value, kinds[name]) for name, value in tree.items()})
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # not on Linux
+        return os.cpu_count() or 1

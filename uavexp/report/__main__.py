@@ -1,0 +1,55 @@
+"""`python -m uavexp.report DIR [DIR ...]`: tables, figures and page again, from stored trials."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from uavexp.errors import UavexpError
+
+_USAGE = """usage: python -m uavexp.report DIR [DIR ...]
+
+Writes tables, figures, claims and report.html of each study folder from its stored trials;
+nothing is flown. DIR: a folder that `python -m uavexp` left behind, e.g. outputs/mcr/table1
+"""
+_PATIENCE_S = 2.0  # nothing is said about work that is done sooner
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Make the report of every folder named and return the exit code: 0, 2 bad input, 130 interrupted."""
+    os.environ["MPLBACKEND"] = "Agg"
+    names = list(sys.argv[1:] if arguments is None else arguments)
+    if not names or {"-h", "--help"} & set(names):
+        (sys.stdout if names else sys.stderr).write(_USAGE)
+        return 0 if names else 2
+    try:
+        for name in names:
+            _report(Path(name))
+    except UavexpError as error:
+        sys.stderr.write(f"error: {' '.join(str(error).split())}\n")
+        return 2
+    except KeyboardInterrupt:
+        sys.stderr.write("interrupted\n")
+        return 130
+    return 0
+
+
+def _report(folder: Path) -> None:
+    from uavexp.report.make import make_report
+
+    begin_s = time.monotonic()
+
+    def say(line: str) -> None:
+        if time.monotonic() - begin_s > _PATIENCE_S:
+            sys.stdout.write(f"{folder}: {line}\n")
+            sys.stdout.flush()
+
+    for path in make_report(folder, say):
+        sys.stdout.write(f"{path}\n")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,267 @@
+"""Trials side by side: every arm in the same worlds, summarised and compared in one place."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+
+from uavexp.errors import RecordError
+from uavexp.report import significance, statistics
+from uavexp.report.significance import Alternative
+from uavexp.report.statistics import Interval
+from uavexp.types import Bool, Float, Int
+
+SUCCESS = "success"
+SCENE = "scene"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Metric:
+    """A column of the trials as the report shows it."""
+
+    column: str
+    label: str  # with unit
+    digits: int  # shown
+    better: int = 0  # 1: more is better, -1: less, 0: neither
+    scale: float = 1.0  # shown value over stored value
+    # a path cut short by failure is not a shorter path: compared where both arms succeeded, too
+    needs_arrival: bool = False
+
+    @property
+    def is_rate(self) -> bool:
+        """Whether it is a share of trials, not a mean."""
+        return self.column == SUCCESS
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Estimate:
+    """Mean of a metric over the trials of an arm."""
+
+    n: int  # trials for which it exists
+    mean: float
+    sd: float  # over trials; of a rate: over the scenes' rates; NaN with fewer than two
+    interval: Interval
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Difference:
+    """First arm minus second arm over paired trials."""
+
+    pairs: int
+    units: int  # independent ones: scenes, or pairs when there is one scene
+    first_mean: float
+    second_mean: float
+    mean: float
+    interval: Interval
+    p: float  # sign flips of whole scenes: the primary test
+    p_pairs: float  # McNemar for rates, else Wilcoxon: clustering ignored
+    effect: float  # rank-biserial; of a rate: the difference itself
+
+
+@dataclass(frozen=True, kw_only=True)
+class Panel:
+    """The trials of several arms, a row per world (scene and seed), a column per arm.
+
+    The order of rows does not depend on the order of the trials.
+    """
+
+    arms: tuple[str, ...]
+    scene: Int  # (U,) number of the scene of each row
+    scenes: tuple[str, ...]
+    flown: Bool  # (U, A) whether the trial exists
+    columns: dict[str, Float] = field(default_factory=dict)  # metric -> (U, A), NaN: does not exist
+
+    def values(self, metric: Metric, arm: str) -> Float:
+        """Values (U,) of one arm in the unit shown; NaN where they do not exist."""
+        return self.columns[metric.column][:, self.arms.index(arm)] * metric.scale
+
+    def success(self, arm: str) -> Bool:
+        """Whether each trial (U,) of an arm succeeded; a failed or missing one did not."""
+        succeeded: Bool = self.columns[SUCCESS][:, self.arms.index(arm)] == 1.0
+        return succeeded
+
+    def n(self, arm: str) -> int:
+        """Trials of an arm, failed ones included."""
+        return int(self.flown[:, self.arms.index(arm)].sum())
+
+    def has(self, metric: Metric) -> bool:
+        """Whether the trials have this metric."""
+        return metric.column in self.columns
+
+    @cached_property
+    def samples(self) -> dict[str, Float]:
+        """Resampled means (B, A) of every metric, all resampled together."""
+        names = list(self.columns)
+        if not names:
+            return {}
+        block = np.concatenate([self.columns[name] for name in names], axis=1)
+        means = statistics.resampled_means(block, self.scene)
+        return dict(zip(names, np.split(means, len(names), axis=1), strict=True))
+
+
+def panel_of(
+    trials: pd.DataFrame, arm_axes: Sequence[str], arms: Sequence[str], metrics: Sequence[Metric]
+) -> Panel:
+    """Arrange trials by world and arm.
+
+    Args:
+        trials: one row per trial; failed ones included.
+        arm_axes: columns that name the arm together.
+        arms: names in the order wanted (`arm_names`); others are left out.
+        metrics: to carry along; those the trials do not have are left out.
+
+    Raises:
+        RecordError: two trials of one arm in the same world.
+    """
+    scene = trials[SCENE] if SCENE in trials else pd.Series("", index=trials.index)
+    keys = pd.DataFrame({"scene": scene.to_numpy(), "seed": trials["seed"].to_numpy()})
+    column = pd.Index(arms).get_indexer(pd.Index(arm_names(trials, arm_axes)))
+    wanted = column >= 0
+    units = pd.MultiIndex.from_frame(keys[wanted]).unique().sort_values()
+    row = units.get_indexer(pd.MultiIndex.from_frame(keys))
+    flown = np.zeros((len(units), len(arms)), dtype=bool)
+    flown[row[wanted], column[wanted]] = True
+    if flown.sum() != wanted.sum():
+        raise RecordError(f"two trials of one {'/'.join(arm_axes)} with the same scene and seed")
+    names = units.get_level_values(0)
+    scenes = tuple(names.unique())
+    panel = Panel(arms=tuple(arms), scenes=scenes, scene=pd.Index(scenes).get_indexer(names), flown=flown)
+    for name in dict.fromkeys([SUCCESS, *(metric.column for metric in metrics)]):
+        if name in trials:
+            block = np.full(flown.shape, math.nan)
+            block[row[wanted], column[wanted]] = trials[name].to_numpy(dtype=float, na_value=math.nan)[wanted]
+            panel.columns[name] = block
+    return panel
+
+
+def arm_names(trials: pd.DataFrame, arm_axes: Sequence[str]) -> pd.Series:
+    """Name of each trial's arm: the values of its axes joined by commas."""
+    first, *rest = arm_axes
+    names = trials[first].astype(str)
+    for axis in rest:
+        names = names + ", " + trials[axis].astype(str)
+    return names
+
+
+def estimate(panel: Panel, metric: Metric, arm: str) -> Estimate:
+    """Mean of a metric over an arm's trials, with its spread and interval."""
+    values = panel.values(metric, arm)
+    exists = np.isfinite(values)
+    values, scene = values[exists], panel.scene[exists]
+    if not values.size:
+        return Estimate(n=0, mean=math.nan, sd=math.nan, interval=statistics.NOTHING)
+    spread = significance.cluster_means(values, scene) if metric.is_rate else values
+    return Estimate(
+        n=values.size,
+        mean=float(values.mean()),
+        sd=float(spread.std(ddof=1)) if spread.size > 1 else math.nan,
+        interval=_interval(panel, metric, arm),
+    )
+
+
+def _interval(panel: Panel, metric: Metric, arm: str) -> Interval:
+    column = panel.arms.index(arm)
+    exists = np.isfinite(panel.columns[metric.column][:, column])
+    scene = panel.scene[exists]
+    if metric.is_rate:
+        low, high = statistics.rate_interval(panel.success(arm)[exists], scene)
+        return Interval(metric.scale * low, metric.scale * high)
+    samples = panel.samples[metric.column][:, column]
+    return interval_of(metric.scale * samples, statistics.units_of(scene))
+
+
+def interval_of(samples: Float, units: int) -> Interval:
+    """Bootstrap interval of one quantity from its resampled values (B,)."""
+    low, high = statistics.percentile_interval(samples[:, None], units)
+    return Interval(float(low[0]), float(high[0]))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pairs:
+    """Two arms in the worlds that both were flown in."""
+
+    first: str
+    second: str
+    scene: Int  # (P,)
+    columns: dict[str, Float]  # metric -> (P, 2), NaN: does not exist
+
+    @cached_property
+    def samples(self) -> dict[str, Float]:
+        """Resampled mean differences (B,) of every metric, all resampled together."""
+        block = np.stack([values[:, 0] - values[:, 1] for values in self.columns.values()], axis=1)
+        return dict(zip(self.columns, statistics.resampled_means(block, self.scene).T, strict=True))
+
+
+def pairs_of(
+    panel: Panel, first: str, second: str, metrics: Sequence[Metric], *, both_succeeded: bool = False
+) -> Pairs:
+    """The worlds that two arms were flown in, or only those in which both succeeded."""
+    columns = [panel.arms.index(first), panel.arms.index(second)]
+    rows = panel.flown[:, columns].all(axis=1)
+    if both_succeeded:
+        rows &= panel.success(first) & panel.success(second)
+    return Pairs(
+        first=first,
+        second=second,
+        scene=panel.scene[rows],
+        columns={metric.column: panel.columns[metric.column][rows][:, columns] for metric in metrics},
+    )
+
+
+def compare(
+    pairs: Pairs, metric: Metric, *, margin: float = 0.0, alternative: Alternative = "two-sided"
+) -> Difference:
+    """First arm minus second arm in the same worlds.
+
+    Args:
+        pairs: the trials of both.
+        metric: what is compared.
+        margin: added to the difference before it is tested, in the unit shown: with `greater`
+            the test asks whether the first arm is worse by less than this.
+        alternative: sign of the difference asked about.
+    """
+    values = metric.scale * pairs.columns[metric.column]
+    exist: Bool = np.asarray(np.isfinite(values).all(axis=1))
+    one, two, scene = values[exist, 0], values[exist, 1], pairs.scene[exist]
+    difference = one - two
+    if not difference.size:
+        return _NO_PAIRS
+    return Difference(
+        pairs=difference.size,
+        units=statistics.units_of(scene),
+        first_mean=float(one.mean()),
+        second_mean=float(two.mean()),
+        mean=float(difference.mean()),
+        interval=_difference_interval(pairs, metric, exist),
+        p=significance.sign_flip_p(difference + margin, scene, alternative),
+        p_pairs=significance.mcnemar_p(one > 0.0, two > 0.0)
+        if metric.is_rate
+        else significance.wilcoxon_p(difference),
+        effect=float(difference.mean()) if metric.is_rate else significance.rank_biserial(difference),
+    )
+
+
+_NO_PAIRS = Difference(
+    pairs=0,
+    units=0,
+    first_mean=math.nan,
+    second_mean=math.nan,
+    mean=math.nan,
+    interval=statistics.NOTHING,
+    p=math.nan,
+    p_pairs=math.nan,
+    effect=math.nan,
+)
+
+
+def _difference_interval(pairs: Pairs, metric: Metric, exist: Bool) -> Interval:
+    one, two = pairs.columns[metric.column][exist].T
+    if metric.is_rate and np.array_equal(one, two):  # the bootstrap has nothing to resample
+        low, high = significance.risk_difference_interval(one > 0.0, two > 0.0)
+        return Interval(metric.scale * low, metric.scale * high)
+    return interval_of(metric.scale * pairs.samples[metric.column], statistics.units_of(pairs.scene[exist]))

@@ -1,0 +1,102 @@
+"""Policies side by side: how often and why they replanned, whether it was worth it, how late they were."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from uavexp.report import shown, style
+from uavexp.report.comparison import Metric, Panel, estimate
+from uavexp.report.figures import canvas
+from uavexp.report.parts import Drawing
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+CAUSES = tuple(Metric(column=column, label=label, digits=1) for column, label in shown.CAUSES.items())
+WORTH = (Metric(column="useful_replans", label="useful", digits=1), shown.WASTED)
+METRICS = (*CAUSES, *WORTH, shown.REPLANS, shown.BLOCKED_DELAY)
+
+Fill = tuple[str, str]  # colour, hatch
+_HATCHES = ("", "////", "....", "\\\\\\\\", "xxxx", "----", "++++", "oooo", "||||")
+_CAUSE_FILLS: dict[str, Fill] = {
+    metric.column: (style.cause_mark(metric.column.removeprefix("replans_")).colour, hatch)
+    for metric, hatch in zip(CAUSES, _HATCHES, strict=False)
+}
+_WORTH_FILLS: dict[str, Fill] = {WORTH[0].column: (style.BLUE, ""), WORTH[1].column: ("#E4E4E4", "////")}
+
+
+def replanning_bars(panel: Panel, note: str) -> Drawing:
+    """Draw replans, the shares of their causes and of useful ones, and the delay, a row per policy."""
+    figure = canvas.new_figure(canvas.PAGE_IN, 1.55 + 0.27 * len(panel.arms))
+    parts = figure.subplots(1, 4, sharey=True, width_ratios=(1.0, 1.5, 0.9, 0.9))
+    often, causes, worth, delay = parts
+    _draw_estimates(often, panel, shown.REPLANS)
+    _draw_shares(causes, panel, [metric for metric in CAUSES if _occurs(panel, metric)], _CAUSE_FILLS)
+    _draw_shares(worth, panel, WORTH, _WORTH_FILLS)
+    _draw_estimates(delay, panel, shown.BLOCKED_DELAY)
+    often.set_xscale("symlog", linthresh=1.0, linscale=0.35)
+    often.set_xticks([0, 1, 10, 100], ["0", "1", "10", "100"])
+    often.set_yticks(range(len(panel.arms)), panel.arms)
+    often.set_ylim(len(panel.arms) - 0.5, -0.5)
+    labels = ("replans per mission", "their causes [%]", "worth it [%]", "blocked path\nto request [s]")
+    for axes, label in zip(parts, labels, strict=True):
+        axes.set_xlabel(label, fontsize=8)
+    canvas.tidy(*parts, grid="x")
+    handles, names = (ours + theirs for ours, theirs in zip(*map(_legend_of, (causes, worth)), strict=True))
+    figure.legend(handles, names, loc="outside lower center", ncols=6, fontsize=7.5)
+    return Drawing(name="policies_replans", caption=f"{_CAPTION} {note}", figure=figure)
+
+
+_CAPTION = (
+    "Mean replans per mission of each policy; shares of their causes; share of useful ones, whose new path "
+    "departs from the old by more than 0.1 m, the others wasted; and the mean delay from the first update "
+    "of the map on which the path flown was blocked to the next request, over the answered ones. Dots: means with 95 % "
+    "intervals (scenes resampled); number beside a dot: flights with a value, where fewer than all."
+)
+
+
+def _legend_of(axes: Axes) -> tuple[list[object], list[str]]:
+    handles, names = axes.get_legend_handles_labels()
+    return list(handles), list(names)
+
+
+def _occurs(panel: Panel, metric: Metric) -> bool:
+    return panel.has(metric) and bool(np.nansum(panel.columns[metric.column]) > 0.0)
+
+
+def _draw_shares(axes: Axes, panel: Panel, metrics: Sequence[Metric], fills: Mapping[str, Fill]) -> None:
+    """Stack the metrics' means as percent of their sum; a policy without a replan stays empty."""
+    means = np.array([[estimate(panel, metric, arm).mean for arm in panel.arms] for metric in metrics])
+    means = np.nan_to_num(means)
+    shares = 100.0 * means / np.maximum(means.sum(axis=0), 1e-9)
+    left = np.zeros(len(panel.arms))
+    for metric, width in zip(metrics, shares, strict=True):
+        colour, hatch = fills[metric.column]
+        name = metric.column.removeprefix("replans_").removesuffix("_replans")
+        look: dict[str, Any] = {
+            "color": colour,
+            "hatch": hatch,
+            "ec": "#404040",
+            "lw": 0.4,
+            "hatch_linewidth": 0.5,
+        }
+        axes.barh(range(len(panel.arms)), width, 0.66, left, label=name, **look)
+        left = left + width
+    axes.set_xlim(0.0, 100.0)
+
+
+def _draw_estimates(axes: Axes, panel: Panel, metric: Metric) -> None:
+    for place, arm in enumerate(panel.arms if panel.has(metric) else ()):
+        found = estimate(panel, metric, arm)
+        if not found.n:
+            continue
+        axes.plot(found.interval, (place, place), color=style.BLACK, lw=1.2)
+        axes.plot(found.mean, place, "o", color=style.BLACK, ms=4.5, clip_on=False)
+        if found.n < panel.n(arm):
+            axes.annotate(
+                str(found.n), (found.mean, place), (0, 4), textcoords="offset points", ha="center", fontsize=7
+            )
+    axes.set_xlim(left=0.0)

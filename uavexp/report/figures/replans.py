@@ -1,0 +1,99 @@
+"""Figure 9: when each flight replanned, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import pandas as pd
+from matplotlib.lines import Line2D
+
+from uavexp.report import style
+from uavexp.report.comparison import SCENE
+from uavexp.report.figures import canvas
+from uavexp.report.figures.flown import ARM, executed
+from uavexp.report.parts import Drawing
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+MOST_ROWS = 20  # flights of an arm
+_MOST_ARMS = 4
+
+
+def replan_raster(
+    flights: pd.DataFrame, replans: pd.DataFrame, arms: Sequence[str], scene: str
+) -> Drawing | None:
+    """Draw a row per flight with a marker per replan; a panel per arm that replanned.
+
+    Args:
+        flights: of `flown.flights_of`.
+        replans: of the study.
+        arms: in the order of the panels.
+        scene: whose flights are shown.
+    """
+    flights = flights[(flights[SCENE] == scene) & flights["completion_time_s"].notna()]
+    taken = executed(replans, flights)
+    taken = taken.assign(**{ARM: taken["trial"].map(flights.set_index("trial")[ARM])})
+    arms = [arm for arm in arms if (taken[ARM] == arm).any()][:_MOST_ARMS]
+    if not arms:
+        return None
+    seeds = sorted(flights["seed"].unique())[:MOST_ROWS]
+    rows = (len(arms) + 1) // 2
+    figure = canvas.new_figure(canvas.PAGE_IN, 0.75 + rows * max(1.1, 0.55 + 0.085 * len(seeds)))
+    panels = figure.subplots(rows, min(len(arms), 2), sharex=True, sharey=True, squeeze=False).flat
+    for axes, arm in zip(panels, arms, strict=False):
+        shown = flights[(flights[ARM] == arm) & flights["seed"].isin(seeds)]
+        _draw_panel(axes, arm, shown, taken[taken["trial"].isin(shown["trial"])], seeds)
+    for axes in list(figure.axes)[len(arms) :]:
+        axes.set_axis_off()
+    figure.supylabel("seed", fontsize=9)
+    figure.supxlabel("time [s]", fontsize=9)
+    causes = sorted(taken["cause"].unique(), key=list(style.CAUSE_MARKS).index)
+    figure.legend(handles=_key(causes), loc="outside upper center", ncols=len(causes) + 2, fontsize=8)
+    caption = _caption(arms, scene, [int(seed) for seed in seeds], flights)
+    return Drawing(name="figure_9", caption=caption, figure=figure)
+
+
+def _draw_panel(
+    axes: Axes, arm: str, flights: pd.DataFrame, taken: pd.DataFrame, seeds: Sequence[int]
+) -> None:
+    row_of = {seed: row for row, seed in enumerate(seeds)}
+    rows = flights["seed"].map(row_of)
+    axes.hlines(rows, 0.0, flights["completion_time_s"], color=style.FAINT, lw=1.0, zorder=1)
+    for won, marker, fill in ((True, "|", style.BLACK), (False, "x", style.VERMILLION)):
+        chosen = flights["success"] == won
+        ends_s = flights["completion_time_s"][chosen]
+        axes.plot(ends_s, rows[chosen], marker, color=fill, ms=5, mew=1.3, zorder=3)
+    size_pt = 4.2 if len(taken) < 25 * len(flights) else 2.4
+    for cause, group in taken.groupby("cause"):
+        at = group["trial"].map(flights.set_index("trial")["seed"]).map(row_of)
+        axes.plot(group["time_s"], at, zorder=2, **style.marker(str(cause), size_pt) | {"mew": 0.3})
+    each = len(taken) / max(len(flights), 1)
+    near = f", {100.0 * taken['near_change'].mean():.0f} % near a change" if len(taken) else ""
+    axes.set_title(f"{arm}: {each:.1f} replans a flight{near}", fontsize=8, loc="left")
+    every = 1 if len(seeds) <= 10 else 5
+    axes.set_yticks(
+        range(len(seeds)), [str(seed) if row % every == 0 else "" for row, seed in enumerate(seeds)]
+    )
+    axes.set(xlim=(0.0, None), ylim=(len(seeds) - 0.4, -0.6))
+    canvas.tidy(axes, grid="x")
+
+
+def _key(causes: Sequence[str]) -> list[Line2D]:
+    return [
+        *(Line2D([], [], label=cause, **style.marker(cause, 5.0)) for cause in causes),
+        Line2D([], [], color=style.BLACK, marker="|", ls="", mew=1.3, label="end: success"),
+        Line2D([], [], color=style.VERMILLION, marker="x", ls="", mew=1.3, label="end: failure"),
+    ]
+
+
+def _caption(arms: Sequence[str], scene: str, seeds: Sequence[int], flights: pd.DataFrame) -> str:
+    where = f" in the scene “{scene}”" if scene else ""
+    more = flights["seed"].nunique() - len(seeds)
+    return (
+        f"Replans over time by cause, a row per flight: {', '.join(arms)}{where} (the experiment's first), "
+        f"n = {len(seeds)} flights each, seeds {canvas.span(seeds)}"
+        f"{f', the lowest; {more} more are not drawn' if more > 0 else ''}. Line: the flight's length. "
+        "Near a change: the map was changing near the vehicle or its path when the replan was asked for."
+    )

@@ -1,0 +1,130 @@
+"""The trade-off: what success and what clearance a policy buys with its replans."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from uavexp.report import shown
+from uavexp.report.comparison import SCENE, Metric, Panel, estimate
+from uavexp.report.figures import canvas
+from uavexp.report.figures.flown import ARM
+from uavexp.report.figures.looks import Look, clock_arm, looks_of, primary_arm
+from uavexp.report.parts import Drawing
+from uavexp.study import Study
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+SETTING = "setting"  # axis that tells the cells of one entry apart ("interval_s=2"); made by the command line
+_LINEAR_BELOW = 1.0  # replans; a logarithmic axis with room for none at all
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """The arms of one policy, in the order they are joined."""
+
+    name: str
+    arms: tuple[str, ...]
+    labels: tuple[str, ...]
+    joined: bool  # whether one parameter alone varies, so that a line through the points means something
+
+
+def curves_of(study: Study, flights: pd.DataFrame, panel: Panel) -> list[Curve]:
+    """Which arms make up the curve of one policy.
+
+    With an axis `setting` the arms that differ in nothing else, else those of one trigger; in
+    both cases only when one parameter of the trigger varies among them or the setting names them.
+    """
+    first = flights.drop_duplicates(ARM).set_index(ARM).loc[list(panel.arms)]
+    by = [axis for axis in study.axes if axis not in (SETTING, SCENE)] if SETTING in first else ["trigger"]
+    curves: list[Curve] = []
+    for names, group in first.groupby(by, sort=False):
+        curves += _curves_among(", ".join(map(str, names)), group)
+    return curves
+
+
+def _curves_among(name: str, arms: pd.DataFrame) -> list[Curve]:
+    parameters = [column for column in map(str, arms.columns) if column.startswith("p_trigger_")]
+    varied = [column for column in parameters if arms[column].nunique() > 1]
+    if len(varied) == 1 and arms[varied[0]].notna().all():
+        ordered = arms.sort_values(varied[0])
+        labels = tuple(
+            f"{value:g}" if isinstance(value, float) else str(value) for value in ordered[varied[0]]
+        )
+        full_name = f"{name} over {varied[0].removeprefix('p_trigger_')}"
+        return [Curve(full_name, tuple(ordered.index), labels, joined=True)]
+    if len(arms) > 1 and SETTING in arms:
+        return [Curve(name, tuple(arms.index), tuple(arms[SETTING].astype(str)), joined=False)]
+    return [single(str(arm)) for arm in arms.index]
+
+
+def single(arm: str) -> Curve:
+    """An arm by itself, named in the legend."""
+    return Curve(arm.rstrip(", "), (arm,), ("",), joined=False)
+
+
+def looks_of_curves(study: Study, curves: Sequence[Curve]) -> dict[str, Look]:
+    """Look of every curve; the primary policy and the one by the clock keep theirs."""
+    stems = {curve.name: curve.name.partition(" over ")[0] for curve in curves}
+    known = {primary_arm(study).lower(): primary_arm(study), clock_arm(study).lower(): clock_arm(study)}
+    names = {name: known.get(stem.lower(), name) for name, stem in stems.items()}
+    unique = {
+        name: alias if list(names.values()).count(alias) == 1 else name for name, alias in names.items()
+    }
+    looks = looks_of(study, list(unique.values()))
+    return {name: looks[alias] for name, alias in unique.items()}
+
+
+def plane(
+    panel: Panel, curves: Sequence[Curve], looks: Mapping[str, Look], *, name: str, about: str, note: str
+) -> Drawing:
+    """Draw success and clearance against replans per mission, a curve per policy."""
+    figure = canvas.new_figure(canvas.PAGE_IN, 3.5)
+    sides = figure.subplots(1, 2)
+    for axes, metric in zip(sides, (shown.RATE, shown.CLEARANCE), strict=True):
+        for curve in curves:
+            _draw_curve(axes, panel, metric, curve, looks[curve.name])
+        _finish(axes, metric, panel)
+    sides[0].set_ylim(-3.0, 103.0)
+    columns = min(len(curves), 5)
+    handles, labels = sides[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=columns, fontsize=8, handlelength=2.6)
+    return Drawing(name=name, caption=f"{about} {_CAPTION} {note}", figure=figure)
+
+
+_CAPTION = (
+    "Bars: 95 % intervals of both means (success: Wilson's with the effective number of flights in clusters; "
+    "the others: scenes resampled). Up and to the left is better. The axis of replans is linear below 1, "
+    "logarithmic above."
+)
+
+
+def _draw_curve(axes: Axes, panel: Panel, metric: Metric, curve: Curve, look: Look) -> None:
+    across = [estimate(panel, shown.REPLANS, arm) for arm in curve.arms]
+    up = [estimate(panel, metric, arm) for arm in curve.arms]
+    x, y = np.array([item.mean for item in across]), np.array([item.mean for item in up])
+    x_ends = np.array([item.interval for item in across]).T
+    y_ends = np.array([item.interval for item in up]).T
+    axes.vlines(x, *y_ends, color=look.colour, lw=0.8, alpha=0.55, zorder=2)
+    axes.hlines(y, *x_ends, color=look.colour, lw=0.8, alpha=0.55, zorder=2)
+    line = {"lw": 1.1, **look.line} if curve.joined else {"ls": "", "color": look.colour}
+    axes.plot(x, y, marker=look.marker, ms=5.5, mec="white", mew=0.5, zorder=3, label=curve.name, **line)
+    for place, label in zip(zip(x, y, strict=True), curve.labels, strict=True):
+        note = axes.annotate(label, place, (3, 4), textcoords="offset points", fontsize=canvas.SMALL_PT)
+        note.set_in_layout(False)  # a label at the edge must not shrink the plane
+
+
+def _finish(axes: Axes, metric: Metric, panel: Panel) -> None:
+    axes.set_xscale("symlog", linthresh=_LINEAR_BELOW, linscale=0.35)
+    axes.set(xlabel="replans per mission", ylabel=metric.label)
+    most = max((estimate(panel, shown.REPLANS, arm).mean for arm in panel.arms), default=1.0)
+    axes.set_xlim(-0.15, 1.6 * max(most, 1.0))
+    ticks = [tick for tick in (0, 1, 2, 5, 10, 20, 50, 100, 200, 500) if tick <= 1.6 * max(most, 1.0)]
+    axes.set_xticks(ticks, [str(tick) for tick in ticks])
+    axes.set_xticks([], minor=True)
+    canvas.tidy(axes)

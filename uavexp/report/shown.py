@@ -1,0 +1,88 @@
+"""The metrics as the report shows them: names, units, decimals, and which way is better."""
+
+from __future__ import annotations
+
+from uavexp.report.comparison import SUCCESS, Metric
+
+RATE = Metric(column=SUCCESS, label="Success rate, SR [%]", digits=1, better=1, scale=100.0)
+PATH = Metric(column="path_length_m", label="Path length, APL [m]", digits=1, better=-1, needs_arrival=True)
+TIME = Metric(
+    column="completion_time_s", label="Completion time, CT [s]", digits=1, better=-1, needs_arrival=True
+)
+CONTACTS = Metric(column="collision_count", label="Collisions, CC", digits=2, better=-1)
+CLEARANCE = Metric(column="min_clearance_m", label="Min. clearance, MC [m]", digits=3, better=1)
+REPLANS = Metric(column="replans", label="Replans, RF", digits=1, better=-1)
+TRACKING = Metric(column="tracking_error_m", label="Tracking error, TE [m RMSE]", digits=3, better=-1)
+
+DETOUR = Metric(column="detour", label="Path / shortest path", digits=2, better=-1, needs_arrival=True)
+UNSAFE = Metric(column="time_below_safety_s", label="Time below safe clearance [s]", digits=2, better=-1)
+ACCELERATION = Metric(
+    column="acceleration_integral_m2ps3",
+    label="Smoothness, ∫‖acceleration‖² [m²/s³]",
+    digits=1,
+    better=-1,
+    needs_arrival=True,
+)
+JERK = Metric(
+    column="jerk_integral_m2ps5",
+    label="Smoothness, ∫‖jerk‖² [m²/s⁵]",
+    digits=0,
+    better=-1,
+    needs_arrival=True,
+)
+NEAR_CHANGE = Metric(
+    column="replans_near_change_share",
+    label="Replans near a map change [%]",
+    digits=0,
+    better=1,
+    scale=100.0,
+)
+USEFUL = Metric(column="useful_share", label="Useful replans [%]", digits=0, better=1, scale=100.0)
+WASTED = Metric(column="wasted_replans", label="Wasted replans", digits=1, better=-1)
+BLOCKED_DELAY = Metric(
+    column="blocked_delay_s", label="Delay from blocked path to request [s]", digits=3, better=-1
+)
+BLOCKED_UNANSWERED = Metric(
+    column="blocked_unanswered", label="Blocked paths without an answer", digits=2, better=-1
+)
+
+TABLE_1 = (RATE, PATH, TIME, CONTACTS, CLEARANCE, REPLANS, TRACKING)
+
+# causes of replans, by column: one table row each where any trial has some
+CAUSES = {
+    f"replans_{cause}": f"Replans, cause {cause}"
+    for cause in (
+        "map",
+        "goal",
+        "clock",
+        "distance",
+        "collision",
+        "covered",
+        "expired",
+        "arrival",
+        "other",
+    )
+}
+
+FURTHER = (
+    DETOUR,
+    Metric(column="mean_speed_mps", label="Mean speed [m/s]", digits=2),
+    Metric(column="min_clearance_esdf_m", label="Min. clearance in the map (ESDF) [m]", digits=3, better=1),
+    UNSAFE,
+    Metric(column="contact_time_s", label="Time in contact [s]", digits=2, better=-1),
+    ACCELERATION,
+    JERK,
+    *(Metric(column=column, label=label, digits=1) for column, label in CAUSES.items()),
+    Metric(column="replans_per_m", label="Replans per metre [1/m]", digits=2),
+    Metric(column="replans_per_s", label="Replans per second [1/s]", digits=2),
+    NEAR_CHANGE,
+    USEFUL,
+    Metric(column="failed_plans", label="Requests without a plan", digits=2, better=-1),
+    Metric(column="dropped_triggers", label="Triggers dropped while planning", digits=2),
+    Metric(column="blocked_episodes", label="Times the path was blocked", digits=2),
+    BLOCKED_DELAY,
+    BLOCKED_UNANSWERED,
+    Metric(column="tracking_error_max_m", label="Largest tracking error [m]", digits=2, better=-1),
+)
+
+COMPARED = (*TABLE_1, UNSAFE, ACCELERATION, JERK, NEAR_CHANGE)

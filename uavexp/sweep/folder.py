@@ -1,0 +1,120 @@
+"""A study folder while it is written: one writer, trials that are there whole or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import shutil
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import IO
+
+from uavexp.errors import RecordError
+from uavexp.records import write_bytes
+from uavexp.study import ASIDE, TRIALS, WORLDS
+
+LOCK = ".lock"
+_PART = ".part"
+
+
+@contextlib.contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Hold a study folder's lock; the system frees it when this process ends, however that happens.
+
+    Raises:
+        RecordError: another process holds it.
+    """
+    file = (folder / LOCK).open("a+")
+    with file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            file.seek(0)
+            holder = file.read().strip() or "unknown"
+            raise RecordError(
+                f"{folder}: another command (process {holder}) is flying into it; wait for its end, "
+                "or name another folder with out=DIR"
+            ) from error
+        file.truncate(0)
+        file.write(str(os.getpid()))
+        file.flush()
+        yield
+
+
+def put_trial(folder: Path, name: str, files: Mapping[str, bytes]) -> None:
+    """Add a trial's folder, whole or not at all; an earlier one of that name is set aside.
+
+    Raises:
+        RecordError: it cannot be written, as when the disk is full; nothing is left behind.
+    """
+    trial = folder / TRIALS / name
+    part = trial.with_name(f".{name}{_PART}")
+    try:
+        shutil.rmtree(part, ignore_errors=True)
+        part.mkdir(parents=True)
+        for file, data in files.items():
+            _write(part / file, data)
+        _sync(part)
+        if trial.exists():
+            set_aside(folder, name)
+        part.rename(trial)
+        _sync(trial.parent)
+    except OSError as error:
+        raise RecordError(f"{trial}: cannot be written ({error.strerror or error})") from error
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+def put_world(folder: Path, digest: str, data: bytes) -> None:
+    """Add a world, unless it is there.
+
+    Raises:
+        RecordError: it cannot be written.
+    """
+    file = folder / WORLDS / f"{digest}.npz"
+    if not file.exists():
+        with contextlib.suppress(FileExistsError):
+            file.parent.mkdir()
+        write_bytes(file, data)
+
+
+def set_aside(folder: Path, name: str) -> Path:
+    """Move a trial out of the way, under the first free number; returns where it is now."""
+    trial = folder / TRIALS / name
+    number = 1
+    while (aside := trial.with_name(f"{name}{ASIDE}{number}")).exists():
+        number += 1
+    return trial.rename(aside)
+
+
+def remove_unfinished(folder: Path) -> int:
+    """Remove what a killed sweep was writing; returns how many pieces."""
+    pieces = [
+        *(folder / TRIALS).glob(f".*{_PART}"),
+        *folder.glob(f".*{_PART}"),
+        *(folder / WORLDS).glob(f".*{_PART}"),
+    ]
+    for piece in pieces:
+        if piece.is_dir():
+            shutil.rmtree(piece)
+        else:
+            piece.unlink()
+    return len(pieces)
+
+
+def _write(path: Path, data: bytes) -> None:
+    file: IO[bytes]
+    with path.open("wb") as file:
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def _sync(folder: Path) -> None:
+    """Make the names in a folder durable."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,62 @@
+"""What a sweep runs and what becomes of it; nothing here knows what a job does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+from uavexp.errors import require_positive
+
+Report = Callable[[float, str], None]  # simulated time s, a few words
+Call = Callable[[Any, Report], Any]  # payload in, picklable value out; importable by name
+
+
+class Status(StrEnum):
+    """Whether a job ran to its end. How the flight ended is its outcome, not its status."""
+
+    OK = "ok"
+    RAISED = "raised"  # an exception
+    KILLED = "killed"  # its process died: a signal, a segmentation fault
+    HUNG = "hung"  # ended after its time limit
+    MEMORY = "memory"  # asked for more than its memory limit
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job:
+    """One call to make in a process of its own."""
+
+    name: str  # unique in a sweep
+    label: str  # what the progress calls it
+    payload: Any  # picklable
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """What one job may take."""
+
+    timeout_s: float
+    memory_mb: float  # on top of what a fresh process has
+
+    def __post_init__(self) -> None:
+        require_positive(timeout_s=self.timeout_s, memory_mb=self.memory_mb)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answer:
+    """What came of a call."""
+
+    status: Status
+    value: Any = None  # of the call, when its status is ok
+    reason: str = ""
+    trace: tuple[str, ...] = ()  # frames, without any path of this machine
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Done:
+    """A job, its answer and the clock time it took."""
+
+    job: Job
+    answer: Answer
+    wall_s: float
