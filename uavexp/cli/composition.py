@@ -9,15 +9,15 @@ own words. The resolved tree is plain data from here on and is checked (`trust`,
 from __future__ import annotations
 
 import copy
-import re
 import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from uavexp.build import GROUPS, TOP_LEVEL, check_config
 from uavexp.cli.experiment import Experiment, LabelledCell, expand, list_experiments, read_experiment
+from uavexp.cli.interpolation import one_line, resolved
 from uavexp.cli.options import EXPERIMENT_GROUP, PRESET_GROUP, RUNNER_GROUP, list_options, read_option
 from uavexp.cli.overrides import Setting, expand_grid, expand_seeds, quoted, render
 from uavexp.errors import ConfigError
@@ -29,7 +29,6 @@ TRIGGER_GROUP = "trigger"  # what presets choose
 DEFAULT_PRESET = "mcr"  # config.yaml's
 CELL_AXIS = "cell"
 CONFIG_NAME = "config"
-_KEY_REFERENCE = re.compile(r"\$\{(\w+)\}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -162,7 +161,7 @@ class Composer:
         tree = copy.deepcopy(self._compose_options(tuple(sorted(chosen.items()))))
         for setting in values:
             self._apply(tree, setting)
-        tree = _resolve(tree)
+        tree = resolved(tree)
         check_trust(tree)
         return tree
 
@@ -228,7 +227,7 @@ class Composer:
                 composed = compose(CONFIG_NAME, overrides=arguments, return_hydra_config=True)
             tree: Any = OmegaConf.to_container(composed, resolve=False)
         except bad_input as error:
-            raise ConfigError(f"the configuration does not compose: {_one_line(error)}") from error
+            raise ConfigError(f"the configuration does not compose: {one_line(error)}") from error
         return dict(tree)
 
     def _apply(self, tree: dict[str, Any], setting: Setting) -> None:
@@ -290,74 +289,5 @@ def _refuse_equal_cells(cells: Sequence[Cell]) -> None:
                 raise ConfigError(f"the same configuration twice in one command: {typed}")
 
 
-def _resolve(tree: dict[str, Any]) -> dict[str, Any]:
-    """Resolve `${key}`; refuse `${resolver:...}`, which reads clocks, environment or text as code."""
-    from omegaconf import OmegaConf
-    from omegaconf.errors import OmegaConfBaseException
-
-    hydra = tree["hydra"]
-    own = {key: value for key, value in tree.items() if key != "hydra"}
-    found = list(_interpolations(own, ""))
-    if all(_names_plain_key(text, own) for _, text in found):
-        return {**_follow(own, own), "hydra": hydra}  # OmegaConf takes 20 ms for the same
-    for key, text in found:
-        if _calls_resolver(text):
-            raise ConfigError(f"{key}={text}: only ${{key}} may be used in a value, no ${{resolver:...}}")
-    try:
-        resolved: Any = OmegaConf.to_container(OmegaConf.create(own), resolve=True)
-    except OmegaConfBaseException as error:
-        raise ConfigError(f"the configuration does not resolve: {_one_line(error)}") from error
-    return {**resolved, "hydra": hydra}
-
-
-def _names_plain_key(text: str, top: Mapping[str, Any]) -> bool:
-    """Whether a text is `${key}` and nothing else, of a top-level key that holds one final value."""
-    match = _KEY_REFERENCE.fullmatch(text)
-    value = top.get(match[1], {}) if match else {}
-    return not isinstance(value, Mapping | list) and "${" not in str(value)
-
-
-def _follow(node: Any, top: Mapping[str, Any]) -> Any:
-    """The node with every `${key}` replaced by that top-level value."""
-    if isinstance(node, dict):
-        return {key: _follow(value, top) for key, value in node.items()}
-    if isinstance(node, list):
-        return [_follow(value, top) for value in node]
-    match = _KEY_REFERENCE.fullmatch(node) if isinstance(node, str) else None
-    return top[match[1]] if match else node
-
-
-def _interpolations(node: Any, path: str) -> Iterator[tuple[str, str]]:
-    if isinstance(node, Mapping):
-        for key, value in node.items():
-            yield from _interpolations(value, f"{path}.{key}" if path else str(key))
-    elif isinstance(node, list):
-        for index, value in enumerate(node):
-            yield from _interpolations(value, f"{path}[{index}]")
-    elif isinstance(node, str) and "${" in node:
-        yield path, node
-
-
-def _calls_resolver(text: str) -> bool:
-    from omegaconf.errors import GrammarParseError
-    from omegaconf.grammar_parser import parse
-
-    def walk(context: Any) -> bool:
-        if type(context).__name__ == "InterpolationResolverContext":
-            return True
-        return any(walk(child) for child in getattr(context, "children", None) or ())
-
-    try:
-        return walk(parse(text))
-    except GrammarParseError as error:
-        raise ConfigError(f"cannot read the value {text!r}") from error
-
-
 def _file_url(folder: Path) -> str:
     return quoted(f"file://{folder}")
-
-
-def _one_line(error: BaseException) -> str:
-    text = " ".join(str(error).split())
-    cause = error.__cause__
-    return f"{text or type(error).__name__}" + (f" ({' '.join(str(cause).split())})" if cause else "")
