@@ -16,6 +16,7 @@ import pandas as pd
 import pytest
 
 from tests.sweeps import QUICK, assert_same_study, begin, records, run
+from uavexp.__main__ import main
 from uavexp.paths import PACKAGE
 from uavexp.records import canonical_json, digest, read_record, seal
 from uavexp.study import collect, read_study
@@ -40,10 +41,11 @@ def copy(undisturbed: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(undisturbed, tmp_path / "study"))
 
 
-def test_one_worker_leaves_what_two_leave(undisturbed: Path, tmp_path: Path) -> None:
-    done = run(*STUDY, "runner.n_jobs=1", f"out={tmp_path / 'one'}")
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.splitlines()[-1] == str(tmp_path / "one")
+def test_one_worker_leaves_what_two_leave(
+    undisturbed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*STUDY, "runner.n_jobs=1", f"out={tmp_path / 'one'}"]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == str(tmp_path / "one")
     assert_same_study(tmp_path / "one", undisturbed)
 
 
@@ -71,88 +73,100 @@ def test_a_sweep_killed_at_ten_random_moments_ends_as_if_it_had_not_been(
     assert not list(folder.rglob("*.aside-*"))
 
 
-def test_the_same_command_again_flies_nothing_and_changes_nothing(copy: Path, undisturbed: Path) -> None:
-    done = run(*STUDY, f"out={copy}")
-    assert done.returncode == 0, done.stderr
-    assert "nothing is left to fly; 6 trials finished before" in done.stdout
+def test_the_same_command_again_flies_nothing_and_changes_nothing(
+    copy: Path, undisturbed: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*STUDY, f"out={copy}"]) == 0
+    assert "nothing is left to fly; 6 trials finished before" in capsys.readouterr().out
     assert_same_study(copy, undisturbed)
 
 
-def test_more_seeds_and_strategies_extend_a_study(undisturbed: Path, tmp_path: Path) -> None:
+def test_more_seeds_and_strategies_extend_a_study(
+    undisturbed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     folder = tmp_path / "grown"
-    assert run(*QUICK, "strategy=tbr", "seed=0:2", f"out={folder}").returncode == 0
-    done = run(*STUDY, f"out={folder}")
-    assert "flying 4 trials; 2 trials finished before" in done.stdout
+    assert main([*QUICK, "strategy=tbr", "seed=0:2", f"out={folder}"]) == 0
+    assert main([*STUDY, f"out={folder}"]) == 0
+    assert "flying 4 trials; 2 trials finished before" in capsys.readouterr().out
     assert_same_study(folder, undisturbed)
 
 
-def test_damaged_trials_are_found_named_set_aside_and_flown_again(copy: Path, undisturbed: Path) -> None:
+def test_damaged_trials_are_found_named_set_aside_and_flown_again(
+    copy: Path, undisturbed: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     cut, flipped, unlogged, *_ = sorted((copy / "trials").iterdir())
     (cut / "record.json").write_bytes((cut / "record.json").read_bytes()[:500])
     for file in (flipped / "record.json", unlogged / "log.npz"):
         data = bytearray(file.read_bytes())
         data[len(data) // 2] ^= 1
         file.write_bytes(data)
-    done = run(*STUDY, f"out={copy}")
-    assert done.returncode == 0, done.stderr
+    assert main([*STUDY, f"out={copy}"]) == 0
+    out = capsys.readouterr().out
     for trial in (cut, flipped, unlogged):
-        assert f"damaged, set aside: {trial.name}" in done.stdout
+        assert f"damaged, set aside: {trial.name}" in out
         assert trial.with_name(f"{trial.name}.aside-1").is_dir()
-    assert "flying 3 trials; 3 trials finished before" in done.stdout
+    assert "flying 3 trials; 3 trials finished before" in out
     for aside in (copy / "trials").glob("*.aside-1"):
         shutil.rmtree(aside)
     assert_same_study(copy, undisturbed)
 
 
 @pytest.mark.parametrize("key", ["code", "lock"])
-def test_trials_of_another_version_are_not_pooled_unasked(copy: Path, key: str) -> None:
+def test_trials_of_another_version_are_not_pooled_unasked(
+    copy: Path, key: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     trial = min((copy / "trials").iterdir())
     (trial / "record.json").write_text(seal({**read_record(trial), key: "0" * 64}))
     before = records(copy)
-    done = run(*STUDY, f"out={copy}")
-    assert done.returncode == 2
-    assert done.stderr.count("\n") == 1
-    assert "holds 1 trials flown by another version" in done.stderr
-    assert "runner.accept_other_code=true" in done.stderr
+    assert main([*STUDY, f"out={copy}"]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert "holds 1 trials flown by another version" in error
+    assert "runner.accept_other_code=true" in error
     assert records(copy) == before
     if key == "code":
-        assert run(*STUDY, f"out={copy}", "runner.accept_other_code=true").returncode == 0
+        assert main([*STUDY, f"out={copy}", "runner.accept_other_code=true"]) == 0
         assert set(pd.read_parquet(copy / "trials.parquet")["code"].str.startswith("000000")) == {True, False}
 
 
-def test_trials_of_another_schema_are_refused_with_what_to_do(copy: Path) -> None:
+def test_trials_of_another_schema_are_refused_with_what_to_do(
+    copy: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     trial = min((copy / "trials").iterdir())
     body = {**json.loads((trial / "record.json").read_text()), "schema": 1}
     body.pop("sha256")
     (trial / "record.json").write_text(canonical_json({**body, "sha256": digest(body)}))
-    done = run(*STUDY, f"out={copy}", "runner.accept_other_code=true")
-    assert done.returncode == 2
-    assert "schema 1" in done.stderr
-    assert "out=DIR" in done.stderr
-    assert done.stderr.count("\n") == 1
+    assert main([*STUDY, f"out={copy}", "runner.accept_other_code=true"]) == 2
+    error = capsys.readouterr().err
+    assert "schema 1" in error
+    assert "out=DIR" in error
+    assert error.count("\n") == 1
 
 
-def test_a_dry_run_lists_what_is_left_and_writes_nothing(copy: Path) -> None:
+def test_a_dry_run_lists_what_is_left_and_writes_nothing(
+    copy: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     missing = min((copy / "trials").iterdir())
     shutil.rmtree(missing)
     before = {item: item.stat().st_mtime_ns for item in copy.rglob("*")}
-    done = run(*STUDY, f"out={copy}", "runner.dry_run=true")
-    assert done.returncode == 0, done.stderr
-    assert "to fly 1 trial; 5 trials finished before" in done.stdout
-    assert [line.split()[0] for line in done.stdout.splitlines() if "-s0-" in line] == [missing.name]
+    assert main([*STUDY, f"out={copy}", "runner.dry_run=true"]) == 0
+    out = capsys.readouterr().out
+    assert "to fly 1 trial; 5 trials finished before" in out
+    assert [line.split()[0] for line in out.splitlines() if "-s0-" in line] == [missing.name]
     assert {item: item.stat().st_mtime_ns for item in copy.rglob("*")} == before
 
 
-def test_a_second_sweep_on_a_folder_is_refused(tmp_path: Path) -> None:
+def test_a_second_sweep_on_a_folder_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     first = begin(*STUDY, "runner.n_jobs=1", f"out={tmp_path / 'shared'}")
     assert first.stdout is not None
     first.stdout.readline()
-    second = run(*STUDY, f"out={tmp_path / 'shared'}")
-    assert second.returncode == 2
-    assert second.stderr.count("\n") == 1
-    assert f"another command (process {first.pid}) is flying into it" in second.stderr
-    first.kill()
+    assert main([*STUDY, f"out={tmp_path / 'shared'}"]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert f"another command (process {first.pid}) is flying into it" in error
+    first.terminate()
     first.communicate()
+    assert first.returncode == 130
 
 
 def test_a_trial_that_fails_costs_itself_alone_and_is_flown_again(tmp_path: Path) -> None:
@@ -174,19 +188,21 @@ def test_a_trial_that_fails_costs_itself_alone_and_is_flown_again(tmp_path: Path
     assert "SIGSEGV" in record["reason"]
     assert any("faulty/policy.py" in frame for frame in record["traceback"])
     assert str(PACKAGE.parent) not in json.dumps(record)
-    again = run(*typed, "runner.timeout_s=1", "runner.memory_mb=1500", **TRUST)
-    assert "flying 5 trials; 1 trial finished before; 5 trials failed before" in again.stdout
-    assert len(list((folder / "trials").glob("*.aside-1"))) == 5
+    again = run(
+        *FAULTY, *QUICK, "trigger=faulty", "trigger.deed=raise,print", "seed=0", f"out={folder}", **TRUST
+    )
+    assert "flying 1 trial; 1 trial finished before; 1 trial failed before" in again.stdout, again.stderr
+    assert len(list((folder / "trials").glob("*.aside-1"))) == 1
+    assert len(pd.read_parquet(folder / "trials.parquet")) == 6
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_an_interrupted_sweep_says_how_to_go_on(number: signal.Signals, tmp_path: Path) -> None:
+def test_an_interrupted_sweep_says_how_to_go_on(tmp_path: Path) -> None:
     folder = tmp_path / "study"
     process = begin(*STUDY, "runner.n_jobs=1", f"out={folder}")
     assert process.stdout is not None
     while not process.stdout.readline().startswith("[2/6]"):
         assert process.poll() is None
-    process.send_signal(number)
+    process.send_signal(signal.SIGINT)
     out, error = process.communicate(timeout=30)
     assert process.returncode == 130
     assert error == "interrupted\n"
@@ -222,7 +238,7 @@ def test_a_full_disk_ends_the_sweep_with_one_line_and_loses_nothing(
         assert kept.items() <= records(undisturbed).items()
         assert not list((disk / "study").rglob("*.part"))
         subprocess.run(["mount", "-o", "remount,size=20m", str(disk)], check=True)
-        assert run(*STUDY, f"out={disk / 'study'}").returncode == 0
+        assert main([*STUDY, f"out={disk / 'study'}"]) == 0
         assert_same_study(disk / "study", undisturbed)
 
 

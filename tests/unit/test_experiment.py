@@ -119,6 +119,20 @@ def test_a_bad_file_is_told(tmp_path: Path, text: str, words: list[str]) -> None
     assert all(word in str(told.value) for word in words)
 
 
+def test_an_axis_may_be_borrowed(tmp_path: Path) -> None:
+    folder = tmp_path / "own"
+    folder.mkdir()
+    (folder / "two.yaml").write_text(TEXT)
+    (folder / "more.yaml").write_text("axes: {arm: {a: {strategy: ssp}}, scene: own/two}")
+    (folder / "none.yaml").write_text("axes: {arm: {a: {strategy: ssp}}, place: own/two}")
+    (folder / "self.yaml").write_text("axes: {arm: own/self}")
+    two, more = (read_experiment(f"own/{name}", folder / f"{name}.yaml") for name in ("two", "more"))
+    assert more.axes["scene"] == two.axes["scene"]
+    for name in ("none", "self"):
+        with pytest.raises(ConfigError, match="has no axis"):
+            read_experiment(f"own/{name}", folder / f"{name}.yaml")
+
+
 def test_a_strangers_experiment_runs_no_code(tmp_path: Path) -> None:
     folder = tmp_path / "experiments" / "own"
     folder.mkdir(parents=True)

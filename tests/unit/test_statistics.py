@@ -203,3 +203,12 @@ def test_risk_difference_interval_by_hand() -> None:
     assert ends == pytest.approx((one - two - half, one - two + half), abs=1e-6)
     nothing = significance.risk_difference_interval(first, first)
     assert nothing.low < 0.0 < nothing.high
+
+
+@pytest.mark.parametrize("units", [5, 10, 40])
+def test_percentiles_of_a_normal_bootstrap_give_students_interval(units: int) -> None:
+    """A bootstrap has the variance with divisor n; the interval must come out as t asks with n - 1."""
+    bootstrap = stats.norm.ppf((np.arange(400_000) + 0.5) / 400_000)[:, None]
+    low, high = statistics.percentile_interval(bootstrap, units)
+    student = stats.t.ppf(0.975, units - 1) * math.sqrt(units / (units - 1))
+    assert (low[0], high[0]) == pytest.approx((-student, student), rel=2e-3)

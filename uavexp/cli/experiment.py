@@ -14,8 +14,10 @@
 
 An entry's values are what would be typed after `=`: text is read by the same parser, so
 `"1,2,5"` are three values and each makes a cell of its own, told apart by the axis
-`setting`. On the command line an axis picks entries (`arm=MCR,SSP`), a key that entries
-set replaces their values there and nowhere else, and any other key holds for every cell.
+`setting`. An axis given as the name of another experiment, `scene: mcr/table1`, has the
+entries of that experiment's axis. On the command line an axis picks entries (`arm=MCR,SSP`),
+a key that entries set replaces their values there and nowhere else, and any other key holds
+for every cell.
 """
 
 from __future__ import annotations
@@ -65,8 +67,13 @@ def list_experiments(folders: Iterable[Path]) -> dict[str, Path]:
     }
 
 
-def read_experiment(name: str, file: Path) -> Experiment:
+def read_experiment(name: str, file: Path, *, borrow: bool = True) -> Experiment:
     """Read one experiment's file.
+
+    Args:
+        name: `<paper>/<table>`.
+        file: its yaml.
+        borrow: whether axes may come from other experiments; otherwise such axes are left out.
 
     Raises:
         ConfigError: it cannot be read, or a part is missing, unknown or of the wrong kind.
@@ -94,10 +101,21 @@ def read_experiment(name: str, file: Path) -> Experiment:
         settings=_mapping(name, "settings", tree.get("settings", {})),
         fixed=_settings(name, "fixed", tree.get("fixed", {})),
         axes={
-            str(axis): _entries(name, str(axis), _mapping(name, f"axes.{axis}", entries))
+            str(axis): _borrowed(name, file, str(axis), entries)
+            if isinstance(entries, str)
+            else _entries(name, str(axis), _mapping(name, f"axes.{axis}", entries))
             for axis, entries in tree["axes"].items()
+            if borrow or not isinstance(entries, str)
         },
     )
+
+
+def _borrowed(name: str, file: Path, axis: str, other: str) -> Mapping[str, tuple[Setting, ...]]:
+    """Entries of the same axis in another experiment, which must have its own."""
+    axes = read_experiment(other, file.parent.parent / f"{other}.yaml", borrow=False).axes
+    if axis not in axes:
+        raise ConfigError(f"experiments={name}: axes.{axis}: {other} has no axis {axis}")
+    return axes[axis]
 
 
 def expand(

@@ -124,7 +124,7 @@ def _saved_replans(panel: Panel, primary: str, clock: str) -> Iterator[Claim]:
             continue
         samples = panel.samples[shown.REPLANS.column]
         ratio = samples[:, panel.arms.index(primary)] / samples[:, panel.arms.index(other)]
-        ends = interval_of(100.0 * (1.0 - ratio), statistics.units_of(panel.scene))
+        ends = interval_of(100.0 * (1.0 - ratio), statistics.units_of(panel.cluster))
         saved = 100.0 * (1.0 - means[primary].mean / means[other].mean)
         yield Claim(
             statement=f"{primary} replans {100 * _SAVED:g} % less often than {other}",

@@ -16,6 +16,7 @@ from uavexp.report.significance import Alternative
 from uavexp.report.statistics import Interval
 from uavexp.types import Bool, Float, Int
 
+FEWEST_SCENES = 6  # with fewer, sign flips of scenes cannot give p < 0.05, nor the bootstrap 95 %
 SUCCESS = "success"
 SCENE = "scene"
 
@@ -67,7 +68,9 @@ class Difference:
 class Panel:
     """The trials of several arms, a row per world (scene and seed), a column per arm.
 
-    The order of rows does not depend on the order of the trials.
+    The order of rows does not depend on the order of the trials. Scenes are the independent
+    units, so that intervals and tests speak of other scenes like these; with fewer than
+    `FEWEST_SCENES` the rows are, and they speak of other seeds in these scenes.
     """
 
     arms: tuple[str, ...]
@@ -75,6 +78,11 @@ class Panel:
     scenes: tuple[str, ...]
     flown: Bool  # (U, A) whether the trial exists
     columns: dict[str, Float] = field(default_factory=dict)  # metric -> (U, A), NaN: does not exist
+
+    @property
+    def cluster(self) -> Int:
+        """Cluster of each row (U,): its scene, or the same for all where rows are the units."""
+        return self.scene if len(self.scenes) >= FEWEST_SCENES else np.zeros_like(self.scene)
 
     def values(self, metric: Metric, arm: str) -> Float:
         """Values (U,) of one arm in the unit shown; NaN where they do not exist."""
@@ -100,7 +108,7 @@ class Panel:
         if not names:
             return {}
         block = np.concatenate([self.columns[name] for name in names], axis=1)
-        means = statistics.resampled_means(block, self.scene)
+        means = statistics.resampled_means(block, self.cluster)
         return dict(zip(names, np.split(means, len(names), axis=1), strict=True))
 
 
@@ -140,12 +148,12 @@ def panel_of(
 
 
 def arm_names(trials: pd.DataFrame, arm_axes: Sequence[str]) -> pd.Series:
-    """Name of each trial's arm: the values of its axes joined by commas."""
-    first, *rest = arm_axes
-    names = trials[first].astype(str)
-    for axis in rest:
-        names = names + ", " + trials[axis].astype(str)
-    return names
+    """Name of each trial's arm: the values of its axes joined by commas, empty ones left out."""
+    names = pd.Series("", index=trials.index)
+    for axis in arm_axes:
+        values = trials[axis].astype(str)
+        names = names + values.where(values == "", ", " + values)
+    return names.str.removeprefix(", ")
 
 
 def estimate(panel: Panel, metric: Metric, arm: str) -> Estimate:
@@ -167,12 +175,12 @@ def estimate(panel: Panel, metric: Metric, arm: str) -> Estimate:
 def _interval(panel: Panel, metric: Metric, arm: str) -> Interval:
     column = panel.arms.index(arm)
     exists = np.isfinite(panel.columns[metric.column][:, column])
-    scene = panel.scene[exists]
+    cluster = panel.cluster[exists]
     if metric.is_rate:
-        low, high = statistics.rate_interval(panel.success(arm)[exists], scene)
+        low, high = statistics.rate_interval(panel.success(arm)[exists], cluster)
         return Interval(metric.scale * low, metric.scale * high)
     samples = panel.samples[metric.column][:, column]
-    return interval_of(metric.scale * samples, statistics.units_of(scene))
+    return interval_of(metric.scale * samples, statistics.units_of(cluster))
 
 
 def interval_of(samples: Float, units: int) -> Interval:
@@ -188,13 +196,14 @@ class Pairs:
     first: str
     second: str
     scene: Int  # (P,)
+    cluster: Int  # (P,) as in the panel
     columns: dict[str, Float]  # metric -> (P, 2), NaN: does not exist
 
     @cached_property
     def samples(self) -> dict[str, Float]:
         """Resampled mean differences (B,) of every metric, all resampled together."""
         block = np.stack([values[:, 0] - values[:, 1] for values in self.columns.values()], axis=1)
-        return dict(zip(self.columns, statistics.resampled_means(block, self.scene).T, strict=True))
+        return dict(zip(self.columns, statistics.resampled_means(block, self.cluster).T, strict=True))
 
 
 def pairs_of(
@@ -209,6 +218,7 @@ def pairs_of(
         first=first,
         second=second,
         scene=panel.scene[rows],
+        cluster=panel.cluster[rows],
         columns={metric.column: panel.columns[metric.column][rows][:, columns] for metric in metrics},
     )
 
@@ -227,18 +237,18 @@ def compare(
     """
     values = metric.scale * pairs.columns[metric.column]
     exist: Bool = np.asarray(np.isfinite(values).all(axis=1))
-    one, two, scene = values[exist, 0], values[exist, 1], pairs.scene[exist]
+    one, two, cluster = values[exist, 0], values[exist, 1], pairs.cluster[exist]
     difference = one - two
     if not difference.size:
         return _NO_PAIRS
     return Difference(
         pairs=difference.size,
-        units=statistics.units_of(scene),
+        units=statistics.units_of(cluster),
         first_mean=float(one.mean()),
         second_mean=float(two.mean()),
         mean=float(difference.mean()),
         interval=_difference_interval(pairs, metric, exist),
-        p=significance.sign_flip_p(difference + margin, scene, alternative),
+        p=significance.sign_flip_p(difference + margin, cluster, alternative),
         p_pairs=significance.mcnemar_p(one > 0.0, two > 0.0)
         if metric.is_rate
         else significance.wilcoxon_p(difference),
@@ -264,4 +274,4 @@ def _difference_interval(pairs: Pairs, metric: Metric, exist: Bool) -> Interval:
     if metric.is_rate and np.array_equal(one, two):  # the bootstrap has nothing to resample
         low, high = significance.risk_difference_interval(one > 0.0, two > 0.0)
         return Interval(metric.scale * low, metric.scale * high)
-    return interval_of(metric.scale * pairs.samples[metric.column], statistics.units_of(pairs.scene[exist]))
+    return interval_of(metric.scale * pairs.samples[metric.column], statistics.units_of(pairs.cluster[exist]))

@@ -9,16 +9,15 @@ import numpy as np
 import pandas as pd
 
 from uavexp.report import cells
-from uavexp.report.comparison import SCENE, Metric, Panel, estimate, panel_of
+from uavexp.report.comparison import FEWEST_SCENES, SCENE, Metric, Panel, estimate, panel_of
 from uavexp.report.parts import Claim, Table
 from uavexp.study import Study
 
 OK = "ok"  # status of a trial that ran to its end
 
 INTERVALS = (
-    "In brackets 95 % intervals. Rates: Wilson's, with the effective number of trials in clusters. Means: "
-    "bootstrap, scenes resampled, then seeds within them (worlds alone where there is one scene), "
-    "percentiles widened for the number of scenes."
+    "In brackets 95 % intervals. Rates: Wilson's, with the effective number of trials in scenes. Means: "
+    "bootstrap, scenes resampled, then seeds within them, percentiles widened for the number of scenes."
 )
 FAILED = (
     "n counts every trial. One that did not run to its end (killed, out of time or memory) is a failure in "
@@ -58,7 +57,7 @@ def arms_flown(trials: pd.DataFrame, axes: Mapping[str, Sequence[str]]) -> tuple
         return [(place.get(value, len(place)), value) for place, value in zip(places, row, strict=True)]
 
     flown = trials[list(axes)].astype(str).drop_duplicates().itertuples(index=False, name=None)
-    return tuple(", ".join(row) for row in sorted(flown, key=order))
+    return tuple(", ".join(filter(None, row)) for row in sorted(flown, key=order))
 
 
 def study_panel(study: Study, metrics: Sequence[Metric]) -> Panel:
@@ -73,6 +72,11 @@ def circumstances(study: Study, panel: Panel) -> tuple[str, ...]:
     seeds = np.sort(trials["seed"].unique())
     scenes = f" in {len(panel.scenes)} scenes" if len(panel.scenes) > 1 else ""
     notes = [f"{len(trials)} trials{scenes}, {seeds.size} seeds ({seeds[0]} to {seeds[-1]})."]
+    if 1 < len(panel.scenes) < FEWEST_SCENES:
+        notes.append(
+            f"Fewer than {FEWEST_SCENES} scenes: each world counts as independent in intervals and tests, "
+            "which speak of further seeds in these scenes, not of other scenes."
+        )
     if "p_planner_unknown" in trials:
         ways = sorted(trials["p_planner_unknown"].dropna().astype(str).unique())
         notes.append(f"Unknown space in plans: {', '.join(ways)}.")

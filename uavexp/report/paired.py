@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from uavexp.report import cells
-from uavexp.report.comparison import Difference, Metric, Pairs, Panel, compare, pairs_of
+from uavexp.report.comparison import FEWEST_SCENES, Difference, Metric, Pairs, Panel, compare, pairs_of
 from uavexp.report.parts import Table, Verdict
 from uavexp.report.significance import ALPHA, holm, smallest_p
 
@@ -120,9 +120,10 @@ def comparisons_table(tests: Sequence[PairedTest], *rules: str) -> Table:
         ),
         rows=tuple(_row(test) for test in tests),
         notes=(
-            "p, scenes: exact sign flips of the scenes' mean differences, the primary test; p, Holm: the "
-            "same, corrected over the comparisons of one metric; p, pairs: exact McNemar for the success "
-            "rate, else Wilcoxon's signed ranks; they take the flights of one scene for independent.",
+            "p, scenes: sign flips of the scenes' mean differences (of the pairs with fewer than "
+            f"{FEWEST_SCENES} scenes), the primary test, exact up to 20; p, Holm: the same, corrected over "
+            "the comparisons of one metric; p, pairs: exact McNemar for the success rate, else Wilcoxon's "
+            "signed ranks, which take the flights of one scene for independent.",
             "Effect: difference in percentage points for the success rate, else the matched-pairs "
             "rank-biserial correlation (-1 to 1).",
             *rules,

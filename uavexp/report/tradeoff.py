@@ -59,10 +59,11 @@ def findings(study: Study) -> Findings:
     """Every cell with its place on the front, and "MCR beats TBR" for every interval."""
     panel = study_panel(study, METRICS)
     margins = Margins(**{name: study.settings[name] for name in Margins.__slots__ if name in study.settings})
-    primary, clock = str(study.settings.get("primary", "MCR")), str(study.settings.get("time_based", "TBR"))
     return Findings(
         tables=(_table(study, panel),),
-        claims=tuple(_claims(panel, primary, clock, margins)),
+        claims=tuple(
+            _claims(panel, _own_arms(study, panel), str(study.settings.get("time_based", "TBR")), margins)
+        ),
         values=(values_table(panel, METRICS),),
     )
 
@@ -97,12 +98,18 @@ def _table(study: Study, panel: Panel) -> Table:
     )
 
 
-def _claims(panel: Panel, primary: str, clock: str, margins: Margins) -> Iterator[Claim]:
-    if not all(panel.has(metric) for metric in _JUDGED):
-        return
-    ours = [arm for arm in panel.arms if arm.startswith(primary)]
-    for other in (arm for arm in panel.arms if arm.startswith(clock)):
-        yield _beats([_rival(panel, arm, other, margins) for arm in ours], primary, other, margins)
+def _own_arms(study: Study, panel: Panel) -> list[str]:
+    """Arms that stand for MCR: the primary policy, at its default setting where one is named."""
+    primary, default = str(study.settings.get("primary", "MCR")), study.settings.get("default")
+    if default is not None:
+        return [arm for arm in panel.arms if arm == f"{primary}, {default}"]
+    return [arm for arm in panel.arms if arm.startswith(primary)]
+
+
+def _claims(panel: Panel, own: Sequence[str], clock: str, margins: Margins) -> Iterator[Claim]:
+    if all(panel.has(metric) for metric in _JUDGED):
+        for other in (arm for arm in panel.arms if arm.startswith(clock)):
+            yield _beats([_rival(panel, arm, other, margins) for arm in own], other, margins)
 
 
 def _rival(panel: Panel, arm: str, other: str, margins: Margins) -> _Rival:
@@ -115,10 +122,10 @@ def _rival(panel: Panel, arm: str, other: str, margins: Margins) -> _Rival:
     )
 
 
-def _beats(rivals: Sequence[_Rival], primary: str, other: str, margins: Margins) -> Claim:
+def _beats(rivals: Sequence[_Rival], other: str, margins: Margins) -> Claim:
     """Whether some arm of the primary policy is no worse than another and replans less often."""
     paired = [rival for rival in rivals if math.isfinite(rival.p)]
-    statement = f"{primary} beats {other}: as much success and clearance with fewer replans"
+    statement = f"MCR beats {other}: as much success and clearance with fewer replans"
     source = "abstract, §4.3"
     if not paired:
         return Claim(

@@ -55,27 +55,31 @@ def _table1(study: Study) -> Iterator[Drawing]:
     panel = study_panel(study, (shown.RATE, shown.CONTACTS, shown.CLEARANCE))
     looks, reference = looks_of(study, panel.arms), read_reference(study.name)
     note, threshold_m = _note(study, panel), _safety_threshold_m(flights)
+    first, last = _first_and_last(study, flights)
     yield success.success_rates(panel, looks, note)
-    yield from _one_world(study, flights, threshold_m)
+    for name, shared in (("figure_3", first), ("figure_4", last)):
+        if shared:
+            yield paths.flight_paths(name, shared, looks)
+    if first:
+        yield over_time.path_and_tracking("figure_5", first, looks)
     if panel.has(shown.CONTACTS):
         yield safety.collisions(panel, reference, note)
     if panel.has(shown.CLEARANCE):
         yield safety.minimum_clearance(panel, looks, reference, threshold_m, note)
+    if first:
+        yield over_time.clearance_over_time("figure_8", first, looks, threshold_m)
     yield from _events(study, flights)
 
 
-def _one_world(study: Study, flights: pd.DataFrame, threshold_m: float) -> Iterator[Drawing]:
-    """Figures 3, 4, 5 and 8: the three strategies in the first and in the last scene."""
+def _first_and_last(
+    study: Study, flights: pd.DataFrame
+) -> tuple[flown.SharedWorld | None, flown.SharedWorld | None]:
+    """A world of the first and one of the last scene, flown by the three strategies; None without logs."""
     scenes, arms = flown.scenes_of(study, flights), flown.three_arms(study)
-    looks = looks_of(study, flown.arms_of(study))
     there = flown.stored(study, flights)
-    ends = dict.fromkeys((scenes[0], scenes[-1]))
-    worlds = [next(flown.shared_worlds(study, there, arms, [scene]), None) for scene in ends]
-    for name, shared in zip(("figure_3", "figure_4"), filter(None, worlds), strict=False):
-        yield paths.flight_paths(name, shared, looks)
-    for shared in filter(None, worlds[:1]):
-        yield over_time.path_and_tracking("figure_5", shared, looks)
-        yield over_time.clearance_over_time("figure_8", shared, looks, threshold_m)
+    first = next(flown.shared_worlds(study, there, arms, scenes[:1]), None)
+    last = next(flown.shared_worlds(study, there, arms, scenes[1:][-1:]), None)
+    return first, last
 
 
 def _events(study: Study, flights: pd.DataFrame) -> Iterator[Drawing]:

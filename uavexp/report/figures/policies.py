@@ -52,9 +52,9 @@ def replanning_bars(panel: Panel, note: str) -> Drawing:
 
 _CAPTION = (
     "Mean replans per mission of each policy; shares of their causes; share of useful ones, whose new path "
-    "departs from the old by more than 0.1 m, the others wasted; and the mean delay from the first update "
-    "of the map on which the path flown was blocked to the next request, over the answered ones. Dots: means with 95 % "
-    "intervals (scenes resampled); number beside a dot: flights with a value, where fewer than all."
+    "departs from the old by more than 0.1 m, the others wasted; and the mean delay from the first update of "
+    "the map on which the path flown was blocked to the next request, over the answered ones. Dots: means "
+    "with 95 % intervals (scenes resampled); number at a dot: flights with a value, where fewer than all."
 )
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
+from matplotlib.patheffects import withStroke
 
 from uavexp.report import shown
 from uavexp.report.comparison import SCENE, Metric, Panel, estimate
@@ -115,7 +116,8 @@ def _draw_curve(axes: Axes, panel: Panel, metric: Metric, curve: Curve, look: Lo
     line = {"lw": 1.1, **look.line} if curve.joined else {"ls": "", "color": look.colour}
     axes.plot(x, y, marker=look.marker, ms=5.5, mec="white", mew=0.5, zorder=3, label=curve.name, **line)
     for place, label in zip(zip(x, y, strict=True), curve.labels, strict=True):
-        note = axes.annotate(label, place, (3, 4), textcoords="offset points", fontsize=canvas.SMALL_PT)
+        note = axes.annotate(label, place, (4, 3), textcoords="offset points", fontsize=canvas.SMALL_PT)
+        note.set_path_effects([withStroke(linewidth=1.6, foreground="white")])
         note.set_in_layout(False)  # a label at the edge must not shrink the plane
 
 

@@ -1,0 +1,219 @@
+"""`report.html`: one file that holds tables, verdicts, figures and a flight, and needs no network."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterator, Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from uavexp.records import PICTURE, write_text
+from uavexp.report import flight3d
+from uavexp.report.comparison import SCENE
+from uavexp.report.figures import flown
+from uavexp.report.findings import OK, circumstances, study_panel
+from uavexp.report.parts import Claim, Drawing, Table, Verdict
+from uavexp.report.shown import RATE
+from uavexp.study import TRIALS, Study, read_runs, read_wall
+from uavexp.table import TABLE
+
+MOST_FAILED = 300  # rows of the table of failed trials
+_MARKS = {Verdict.REPRODUCED: "✓", Verdict.NOT_REPRODUCED: "✗", Verdict.NOT_TESTABLE: "–"}
+_NOT_REPEATED = ("out=", "runner.")  # parts of a command that are no part of what was flown
+
+
+def write_html(
+    study: Study,
+    tables: Sequence[Table],
+    claims: Sequence[Claim],
+    drawings: Sequence[tuple[Drawing, Path]],
+    path: Path,
+) -> None:
+    """Write the page of a report; the same study gives the same bytes.
+
+    Args:
+        study: what was flown.
+        tables: in the order of the page.
+        claims: with their verdicts.
+        drawings: finished figures with their PNG files.
+        path: of the page. Pictures of trials and pdf figures are linked relative to the study.
+
+    Raises:
+        RecordError: it cannot be written.
+    """
+    sections = {
+        "Result": "\n".join(map(_table, tables[:1])),
+        "Verdicts": _claims(claims) if claims else "",
+        "Figures": "\n".join(_figure(drawing, png) for drawing, png in drawings),
+        "A flight in 3D": flight3d.section(study),
+        "Further tables": "\n".join(map(_table, tables[1:])),
+        "Failed trials": _failed(study),
+    }
+    shown = {title: text for title, text in sections.items() if text}
+    write_text(path, _page(study, shown))
+
+
+def _page(study: Study, sections: Mapping[str, str]) -> str:
+    title = escape(study.title or study.name or "Flown trials")
+    links = " ".join(f'<a href="#{_anchor(name)}">{escape(name)}</a>' for name in sections)
+    body = "\n".join(
+        f'<section id="{_anchor(name)}">\n<h2>{escape(name)}</h2>\n{text}\n</section>'
+        for name, text in sections.items()
+    )
+    return f"""<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title>
+<style>
+{asset("page.css")}</style>
+</head>
+<body>
+<header>
+<h1>{title}</h1>
+{_what_was_flown(study)}
+<nav>{links}</nav>
+</header>
+<main>
+{body}
+</main>
+<script>
+{asset("page.js")}</script>
+</body>
+</html>
+"""
+
+
+def asset(name: str) -> str:
+    """A file of the page that stands beside this module."""
+    return (Path(__file__).with_name("assets") / name).read_text(encoding="utf-8")
+
+
+def _anchor(name: str) -> str:
+    return name.lower().replace(" ", "-")
+
+
+def _what_was_flown(study: Study) -> str:
+    notes = circumstances(study, study_panel(study, (RATE,)))
+    axes = "; ".join(f"{axis}: {', '.join(values)}" for axis, values in study.axes.items())
+    commands = "\n".join(_code(command) for command in _commands(study))
+    return f"<p>{escape(' '.join(notes))}</p>\n<p>{escape(axes)}.</p>\n{commands}"
+
+
+def _commands(study: Study) -> list[str]:
+    """What was typed to fly the study, but for where it went and on how many cores."""
+    typed = [
+        " ".join(_quoted(word) for word in run.get("command", ()) if not word.startswith(_NOT_REPEATED))
+        for run in read_runs(study.folder)
+    ]
+    if not any(typed) and study.name:
+        typed = [f"experiments={study.name}"]
+    return [f"python -m uavexp {words}" for words in dict.fromkeys(typed) if words]
+
+
+def _quoted(word: str) -> str:
+    from shlex import quote
+
+    return quote(word)
+
+
+def _code(command: str) -> str:
+    return f'<p class="command"><code>{escape(command)}</code><button class="copy">copy</button></p>'
+
+
+def _claims(claims: Sequence[Claim]) -> str:
+    counts = ", ".join(
+        f"{sum(claim.verdict is verdict for claim in claims)} {verdict}" for verdict in Verdict
+    )
+    rows = "\n".join(
+        f'<tr class="{claim.verdict.replace(" ", "-")}"><td>{escape(claim.statement)}</td>'
+        f"<td>{escape(claim.source)}</td>"
+        f'<td class="verdict">{_MARKS[claim.verdict]} {escape(claim.verdict)}</td>'
+        f"<td>{escape(claim.evidence)}</td></tr>"
+        for claim in claims
+    )
+    return (
+        f"<p>{counts}.</p>\n"
+        '<div class="wide"><table class="claims"><thead><tr><th>claim</th><th>source</th><th>verdict</th>'
+        f"<th>evidence</th></tr></thead>\n<tbody>\n{rows}\n</tbody></table></div>"
+    )
+
+
+def _table(table: Table) -> str:
+    head = "".join(f"<th>{escape(column)}</th>" for column in table.columns)
+    rows = "\n".join(
+        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in table.rows
+    )
+    notes = "".join(f"<li>{escape(note)}</li>" for note in table.notes)
+    return (
+        f'<h3 id="table-{escape(table.name)}">{escape(table.title)}</h3>\n'
+        f'<div class="wide"><table><thead><tr>{head}</tr></thead>\n<tbody>\n{rows}\n</tbody></table></div>\n'
+        + (f'<ul class="notes">{notes}</ul>' if notes else "")
+    )
+
+
+def _figure(drawing: Drawing, png: Path) -> str:
+    name = drawing.name.replace("_", " ").capitalize()
+    data = base64.b64encode(png.read_bytes()).decode("ascii")
+    width_in = drawing.figure.get_figwidth()
+    pdf = png.with_suffix(".pdf")
+    link = f' <a href="{escape(_relative(pdf))}">pdf</a>' if pdf.is_file() else ""
+    return (
+        f'<figure id="{escape(drawing.name)}">\n'
+        f'<img alt="{escape(name)}" style="width:{1.25 * width_in:.2f}in" '
+        f'src="data:image/png;base64,{data}">\n'
+        f"<figcaption><b>{escape(name)}.</b> {escape(drawing.caption)}{link}</figcaption>\n</figure>"
+    )
+
+
+def _relative(file: Path) -> str:
+    return f"{file.parent.name}/{file.name}"
+
+
+def _failed(study: Study) -> str:
+    """Every trial without success: what became of it, its picture, and the command that repeats it."""
+    flights = flown.flights_of(study)
+    failed = flights[~flights["success"].astype(bool)]
+    if failed.empty:
+        return "<p>Every trial succeeded.</p>"
+    rows = "\n".join(_failed_row(study, row) for row in failed.head(MOST_FAILED).to_dict("records"))
+    rest = len(failed) - MOST_FAILED
+    more = f" The first {MOST_FAILED} are shown, {rest} more are in {TABLE}." if rest > 0 else ""
+    return (
+        f"<p>{len(failed)} of {len(flights)} trials did not reach their target without contact.{more}</p>\n"
+        '<div class="wide tall"><table><thead><tr><th>arm</th><th>scene</th><th>seed</th><th>outcome</th>'
+        "<th>contacts</th><th>picture</th><th>command that repeats it</th></tr></thead>\n"
+        f"<tbody>\n{rows}\n</tbody></table></div>"
+    )
+
+
+def _failed_row(study: Study, row: Mapping[Any, Any]) -> str:
+    folder = study.folder / TRIALS / str(row["trial"])
+    command = row.get("wall_command") or read_wall(folder).get("command", "")
+    there = (folder / PICTURE).is_file()
+    link = f'<a href="{TRIALS}/{escape(str(row["trial"]))}/{PICTURE}">picture</a>' if there else "–"
+    cells = (
+        escape(str(row[flown.ARM])),
+        escape(str(row[SCENE])),
+        str(row["seed"]),
+        escape(" ".join(_ending(row))),
+        _whole(row.get("collision_count")),
+        link,
+        _code(command) if command else "–",
+    )
+    return "<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
+
+
+def _ending(row: Mapping[Any, Any]) -> Iterator[str]:
+    """Outcome, or for a trial that did not run to its end its status, and the reason."""
+    yield str(row["outcome"] if row.get("status", OK) == OK else row["status"])
+    if isinstance(row.get("reason"), str) and row["reason"]:
+        yield f"({row['reason']})"
+
+
+def _whole(number: Any) -> str:
+    return "–" if number is None or pd.isna(number) else f"{number:.0f}"
