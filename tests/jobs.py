@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import multiprocessing
 import os
 import signal
 import time
@@ -59,6 +60,13 @@ def _kill_oneself(_: Any) -> None:
     os.kill(os.getpid(), signal.SIGKILL)
 
 
+def _kill_supervisor(_: Any) -> None:
+    supervisor = multiprocessing.parent_process()
+    assert supervisor is not None
+    os.kill(supervisor.pid, signal.SIGKILL)
+    time.sleep(60.0)
+
+
 def _spin(seconds: float) -> None:
     """Hold the interpreter in C code: no Python thread of this process runs meanwhile."""
     ctypes.PyDLL(None).usleep(int(seconds * 1e6))
@@ -81,6 +89,7 @@ DEEDS = {
     "segfault": _segfault,
     "hog": _hog,
     "kill": _kill_oneself,
+    "kill_supervisor": _kill_supervisor,
     "leave": _leave,
     "print": _print,
     "hog_a_little": _hog_a_little,

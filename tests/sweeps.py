@@ -23,7 +23,8 @@ QUICK = (
 
 def variables(**more: str) -> dict[str, str]:
     """The environment of a command that runs this very package."""
-    return {**os.environ, "PYTHONPATH": str(PACKAGE.parent), "PYTHONUNBUFFERED": "1", **more}
+    places = os.pathsep.join([str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")])
+    return {**os.environ, "PYTHONPATH": places, "PYTHONUNBUFFERED": "1", **more}
 
 
 def begin(*typed: str, **more: str) -> subprocess.Popen[str]:

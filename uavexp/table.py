@@ -129,6 +129,8 @@ def _parameter(value: Any) -> Any:
 
 def _clock(wall: Mapping[str, Any]) -> Row:
     row = {name: value for name, value in wall.items() if name.startswith("wall_")}
+    if "command" in wall:
+        row["wall_command"] = wall["command"]
     for part, lap in wall.get("laps", {}).items():
         row |= {f"wall_{part}_{kind}": lap[kind] for kind in _LAP_KINDS}
     return row

@@ -18,15 +18,19 @@ from uavexp.errors import RecordError
 from uavexp.logs import arrays_digest, log_arrays, read_log, write_log
 from uavexp.records import (
     canonical_json,
+    cell_digest,
     code_digest,
     digest,
     read_record,
     seal,
+    trial_name,
     write_atomically,
     write_text,
 )
-from uavexp.table import FIRST, write_table
-from uavexp.types import Contact, Outcome, PlanStatus, Replan, TrialLog
+from uavexp.table import FIRST, replan_rows, row_of, write_table
+from uavexp.types import Contact, Outcome, PlanStatus, Replan, TrialLog, World
+from uavexp.world.random_columns import RandomColumns
+from uavexp.worlds import read_world, world_bytes, write_world
 
 json_values = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(),
@@ -123,7 +127,7 @@ def test_a_record_comes_back_with_its_nan(tmp_path: Path) -> None:
         lambda text: "",
         lambda text: "[]",
         lambda text: text.replace('"sha256"', '"sha255"'),
-        lambda text: text.replace('"schema":1', '"schema":2'),
+        lambda text: text.replace('"schema":2', '"schema":3'),
         lambda text: text.replace('"metrics":{"x":1.5}', '"metrics":{}'),
     ],
 )
@@ -206,8 +210,109 @@ def test_the_digest_of_arrays_sees_values_types_and_names() -> None:
     assert len({arrays_digest(arrays) for arrays in [base, *others]}) == 5
 
 
-def test_the_code_digest_is_stable() -> None:
-    assert code_digest() == code_digest()
+def test_the_code_digest_is_that_of_what_a_flight_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("trial.py", "planner/search.py", "report/page.py", "sweep/local.py", "cli/run.py"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text("a = 1")
+    monkeypatch.setattr("uavexp.records.PACKAGE", tmp_path)
+    before = code_digest()
+    for name in ("report/page.py", "sweep/local.py", "cli/run.py"):
+        (tmp_path / name).write_text("a = 2")
+    assert code_digest() == before, "asking, running and showing change no flight"
+    for name in ("trial.py", "planner/search.py"):
+        (tmp_path / name).write_text("a = 2")
+        assert code_digest() != before
+        (tmp_path / name).write_text("a = 1")
+    (tmp_path / "trial.py").rename(tmp_path / "flight.py")
+    assert code_digest() != before
+
+
+IDENTITY = {"strategy": "mcr", "options": {"world": "rooms"}, "config": {"step_s": 0.01}, "seed": 3}
+
+
+def test_a_trial_is_named_by_what_makes_it_this_trial() -> None:
+    name = trial_name(IDENTITY)
+    assert name.startswith("mcr_rooms-s3-")
+    assert trial_name({**IDENTITY, "outcome": "reached"}) == name
+    assert trial_name(json.loads(canonical_json(IDENTITY))) == name
+    others = [{**IDENTITY, "seed": 4}, {**IDENTITY, "config": {"step_s": 0.02}}]
+    assert len({name, *map(trial_name, others)}) == 3
+    assert cell_digest(others[0]) == cell_digest(IDENTITY) != cell_digest(others[1])
+
+
+RECORD = {
+    **IDENTITY,
+    "code": "c" * 64,
+    "status": "ok",
+    "reason": "",
+    "config": {"step_s": 0.01, "world": {"_target_": "x.Y", "size_m": [1.0, 2.0], "reach_m": "inf"}},
+    "metrics": {"outcome": "reached", "success": True, "tracking_error_m": math.nan},
+    "world": {"digest": "d", "clutter_density": 0.1, "narrowest_gap_m": "inf", "straight_line_m": 3.0},
+    "replans": [
+        {"time_s": 0.5, "effective_s": None, "cause": "first", "position_m": [1, 2, 3], "goal_m": [4, 5, 6]}
+    ],
+}
+
+
+def test_a_row_is_made_of_a_record_its_clock_times_and_its_labels() -> None:
+    wall = {
+        "command": "c",
+        "wall_trial_s": 2.0,
+        "laps": {"plan": {"sum_s": 1.0, "median_s": 0.1, "p99_s": 0.2}},
+    }
+    row = row_of(RECORD, wall, {"arm": "MCR"})
+    assert row["world"] == "rooms"
+    assert row["arm"] == "MCR"
+    assert row["trial"] == trial_name(RECORD)
+    assert row["world_digest"] == "d"
+    assert row["narrowest_gap_m"] == row["p_world_reach_m"] == math.inf
+    assert row["p_step_s"] == 0.01
+    assert "p_world__target_" not in row
+    assert (row["wall_trial_s"], row["wall_plan_p99_s"]) == (2.0, 0.2)
+    assert "command" not in row
+
+
+def test_a_trial_that_did_not_run_is_a_row_without_measurements() -> None:
+    failed = {key: value for key, value in RECORD.items() if key not in ("world", "replans")}
+    row = row_of({**failed, "status": "killed", "reason": "signal 11", "metrics": {}}, {}, {})
+    assert (row["outcome"], row["success"], row["status"], row["reason"]) == (
+        "error",
+        False,
+        "killed",
+        "signal 11",
+    )
+    assert "tracking_error_m" not in row
+    assert list(replan_rows(failed, {})) == []
+
+
+def test_every_planning_request_is_a_row() -> None:
+    (row,) = replan_rows(RECORD, {"arm": "MCR"})
+    assert (row["number"], row["cause"], row["arm"], row["seed"]) == (0, "first", "MCR", 3)
+    assert [row[name] for name in ("x_m", "y_m", "z_m", "goal_x_m", "goal_y_m", "goal_z_m")] == [
+        1,
+        2,
+        3,
+        4,
+        5,
+        6,
+    ]
+    assert math.isnan(row["effective_s"])
+
+
+def test_a_world_comes_back_as_it_was_and_equal_worlds_give_equal_bytes(tmp_path: Path) -> None:
+    world = RandomColumns(size_m=(8.0, 6.0, 3.0)).generate(np.random.default_rng(1))
+    write_world(tmp_path / "world.npz", world)
+    back = read_world(tmp_path / "world.npz")
+    for item in dataclasses.fields(World):
+        given, got = getattr(world, item.name), getattr(back, item.name)
+        assert type(given) is type(got), item.name
+        assert np.array_equal(given, got) if isinstance(given, np.ndarray) else given == got
+    assert world_bytes(back) == world_bytes(world) == (tmp_path / "world.npz").read_bytes()
+    (tmp_path / "log.npz").write_bytes((tmp_path / "world.npz").read_bytes()[:300])
+    with pytest.raises(RecordError, match="damaged"):
+        read_world(tmp_path / "log.npz")
 
 
 def test_the_table_has_its_columns_in_order_and_its_pages_checked(tmp_path: Path) -> None:

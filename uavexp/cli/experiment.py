@@ -67,6 +67,11 @@ def list_experiments(folders: Iterable[Path]) -> dict[str, Path]:
     }
 
 
+def title_of(name: str, file: Path) -> str:
+    """Title of an experiment; nothing else of it is looked at."""
+    return str(_load(name, file).get("title", name))
+
+
 def read_experiment(name: str, file: Path, *, borrow: bool = True) -> Experiment:
     """Read one experiment's file.
 
@@ -78,13 +83,8 @@ def read_experiment(name: str, file: Path, *, borrow: bool = True) -> Experiment
     Raises:
         ConfigError: it cannot be read, or a part is missing, unknown or of the wrong kind.
     """
-    import yaml  # type: ignore[import-untyped]
-
-    try:
-        tree = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except (OSError, yaml.YAMLError) as error:
-        raise ConfigError(f"experiments={name} cannot be read: {' '.join(str(error).split())}") from error
-    if not isinstance(tree, dict) or not isinstance(tree.get("axes"), dict) or not tree["axes"]:
+    tree = _load(name, file)
+    if not isinstance(tree.get("axes"), dict) or not tree["axes"]:
         raise ConfigError(f"experiments={name}: the file needs axes: {{arm: {{NAME: {{KEY: VALUE}}}}}}")
     for key in tree:
         if key not in _KEYS:
@@ -108,6 +108,16 @@ def read_experiment(name: str, file: Path, *, borrow: bool = True) -> Experiment
             if borrow or not isinstance(entries, str)
         },
     )
+
+
+def _load(name: str, file: Path) -> dict[Any, Any]:
+    import yaml  # type: ignore[import-untyped]
+
+    try:
+        tree = yaml.safe_load(file.read_text(encoding="utf-8"))
+    except (OSError, yaml.YAMLError) as error:
+        raise ConfigError(f"experiments={name} cannot be read: {' '.join(str(error).split())}") from error
+    return tree if isinstance(tree, dict) else {}
 
 
 def _borrowed(name: str, file: Path, axis: str, other: str) -> Mapping[str, tuple[Setting, ...]]:

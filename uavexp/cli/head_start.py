@@ -19,13 +19,15 @@ def give_head_start(settings: Sequence[Setting]) -> None:
     Raises:
         ConfigError: bad seeds.
     """
-    if has_kernels() and _fly_many(settings):
+    if has_kernels() and _need_fork_server(settings):
         start_fork_server([PRELOAD])
 
 
-def _fly_many(settings: Sequence[Setting]) -> bool:
+def _need_fork_server(settings: Sequence[Setting]) -> bool:
     values = {setting.key: setting.values for setting in settings}
     if values.get(f"{RUNNER_GROUP}.dry_run", (False,)) != (False,):
+        return False
+    if "dask" in (*values.get(RUNNER_GROUP, ()), *values.get(f"{RUNNER_GROUP}.backend", ())):
         return False
     seeds = expand_seeds(values.pop("seed")) if "seed" in values else (0,)
     many = len(seeds) * math.prod(len(item) for item in values.values()) > 1

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from pathlib import Path
 
-from uavexp.cli.experiment import list_experiments, read_experiment
+from uavexp.cli.experiment import list_experiments, title_of
 from uavexp.cli.options import PRESET_GROUP, Option, list_options, read_option
 from uavexp.paths import PACKAGE, conf_folder, experiments_folder
 
@@ -63,7 +63,7 @@ def help_text(user_folder: Path | None = None, group: str | None = None) -> str:
 def _experiment_lines(user_folder: Path | None) -> list[str]:
     own = [user_folder / "experiments"] if user_folder else []
     files = list_experiments([experiments_folder(), *own])
-    return [f"  {name:<26} {read_experiment(name, file).title}" for name, file in files.items()]
+    return [f"  {name:<26} {title_of(name, file)}" for name, file in files.items()]
 
 
 def group_names(user_folder: Path | None = None) -> list[str]:

@@ -10,6 +10,8 @@ from typing import Any
 from uavexp.cli.composition import Cell
 from uavexp.cli.flight import Progress, fly_cell
 from uavexp.cli.outputs import failure_files, trial_files
+from uavexp.errors import RecordError
+from uavexp.records import code_digest, lock_digest
 from uavexp.sweep.job import Answer, Job
 from uavexp.worlds import world_bytes
 
@@ -51,6 +53,17 @@ def fly_task(task: Task, progress: Progress) -> Flown:
         success=bool(trial.metrics["success"]),
         reason=trial.log.reason,
     )
+
+
+def fly_task_elsewhere(task: Task, progress: Progress) -> Flown:
+    """Fly one trial on a worker, which must run the version that the record will name.
+
+    Raises:
+        RecordError: it runs another one.
+    """
+    if {"code": code_digest(), "lock": lock_digest()} != task.version:
+        raise RecordError("this Dask worker runs another version of uavexp than the command")
+    return fly_task(task, progress)
 
 
 def files_of(job: Job, answer: Answer, wall_s: float) -> dict[str, bytes]:

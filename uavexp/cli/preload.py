@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import importlib
+import io
 import pkgutil
 
 from uavexp.build import GROUPS
@@ -22,6 +23,20 @@ def _import_everything() -> None:
         importlib.import_module(name)
 
 
+def _draw_something() -> None:
+    """Let matplotlib load its fonts."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    from uavexp.report import page, style
+
+    with style.house_style():
+        sheet = page.lay_out((20.0, 10.0))
+        FigureCanvasAgg(sheet.figure)
+        sheet.plan.set_title("uavexp")
+        sheet.figure.savefig(io.BytesIO(), format="png")
+
+
 _import_everything()
+_draw_something()
 kernels.load()
 gc.freeze()  # or the first collection in a child copies every page it was given

@@ -18,13 +18,14 @@ from uavexp.cli.composition import Command
 from uavexp.cli.flight import check_world, fly_cell
 from uavexp.cli.folders import folder_of, opened
 from uavexp.cli.head_start import PRELOAD
-from uavexp.cli.job import Task, files_of, fly_task
+from uavexp.cli.job import Task, files_of, fly_task, fly_task_elsewhere
 from uavexp.cli.plan import Plan, plan_of
-from uavexp.cli.runner import Runner, cores, read_runner
+from uavexp.cli.runner import Backend, Runner, cores, read_runner
 from uavexp.cli.terminal import Terminal
 from uavexp.errors import ConfigError, RecordError, UavexpError
 from uavexp.records import canonical_json, write_text
 from uavexp.study import RUN, STUDY, collect, read_runs, study_text
+from uavexp.sweep.dask import run_dask
 from uavexp.sweep.faults import failure, reason_of
 from uavexp.sweep.folder import put_trial, put_world, remove_unfinished, set_aside
 from uavexp.sweep.job import Answer, Done, Job, Status
@@ -59,11 +60,11 @@ def execute(
     with opened(folder):
         plan = look()
         if plan.left:
-            _prepare(plan, terminal)
+            _prepare(plan, runner, terminal)
         return _fly_plan(plan, command, runner, terminal, typed)
 
 
-def _prepare(plan: Plan, terminal: Terminal) -> None:
+def _prepare(plan: Plan, runner: Runner, terminal: Terminal) -> None:
     """Start the fork server; while it imports, find out whether every world can be made."""
     alone = len(plan.jobs) == 1
     if not kernels.is_compiled():
@@ -71,7 +72,8 @@ def _prepare(plan: Plan, terminal: Terminal) -> None:
         if not alone:
             _compile_kernels(plan.left[0])
     if not alone:
-        start_fork_server([PRELOAD])
+        if runner.backend == Backend.LOCAL:
+            start_fork_server([PRELOAD])
         _check_worlds([job.payload for job in plan.left])
 
 
@@ -112,6 +114,16 @@ def _fly(plan: Plan, runner: Runner, watch: Watch) -> Iterator[Done]:
     if len(plan.jobs) == 1:
         return (_fly_here(job, watch) for job in plan.left)
     workers = min(runner.workers, max(1, len(plan.left)))
+    if runner.backend == Backend.DASK:
+        return run_dask(
+            fly_task_elsewhere,
+            plan.left,
+            address=runner.address,
+            queue=runner.queue,
+            n_jobs=workers,
+            limits=runner.limits,
+            preload=[PRELOAD],
+        )
     return run_local(fly_task, plan.left, n_jobs=workers, limits=runner.limits, watch=watch)
 
 

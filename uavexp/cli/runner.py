@@ -17,6 +17,13 @@ class Backend(StrEnum):
     """Where the processes are."""
 
     LOCAL = "local"
+    DASK = "dask"
+
+
+class Queue(StrEnum):
+    """What starts Dask's workers on other machines."""
+
+    SLURM = "slurm"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,9 +36,16 @@ class Runner:
     memory_mb: float
     dry_run: bool
     accept_other_code: bool
+    address: str | None
+    queue: str | None
 
     def __post_init__(self) -> None:
         require_option("runner.backend", self.backend, Backend)
+        if self.queue is not None:
+            require_option("runner.queue", self.queue, Queue)
+            require(self.n_jobs >= 1, "runner.queue=slurm needs runner.n_jobs=N, the workers to ask for")
+        if self.backend != Backend.DASK:
+            require(self.address is None and self.queue is None, "runner.address and queue need runner=dask")
         require(self.n_jobs == -1 or self.n_jobs >= 1, f"runner.n_jobs must be -1 or >= 1, got {self.n_jobs}")
         for name in ("timeout_s", "memory_mb"):
             value = getattr(self, name)

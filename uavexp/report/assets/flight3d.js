@@ -58,6 +58,9 @@
     return mesh;
   }
 
+  // pale floor to dark ceiling: the path stands out, in grey print too
+  const HEIGHTS = [[0, "#f4f0e8"], [0.4, "#dccba8"], [0.7, "#a8865a"], [1, "#5f4426"]];
+
   const along = ([x, y, z]) => ({ type: "scatter3d", x, y, z });
   const at = ([x, y, z]) => along([[x], [y], [z]]);
 
@@ -78,9 +81,9 @@
     const cut = Number(slider.value);
     const mesh = surface(flight.map, cut);
     return [
-      { type: "mesh3d", ...mesh, intensity: mesh.z, colorscale: "Cividis", cmin: data.height_m[0],
+      { type: "mesh3d", ...mesh, intensity: mesh.z, colorscale: HEIGHTS, cmin: data.height_m[0],
         cmax: data.height_m[1], flatshading: true, opacity: 1, hoverinfo: "skip", name: "map",
-        lighting: { ambient: 0.75, diffuse: 0.5, specular: 0.05 },
+        lighting: { ambient: 0.9, diffuse: 0.5, specular: 0.05 },
         colorbar: { title: { text: "height [m]" }, len: 0.5, thickness: 12 } },
       { ...along(data.shortest), mode: "lines", name: "true shortest path", hoverinfo: "skip",
         line: { color: "#888888", width: 3, dash: "dot" } },
@@ -103,7 +106,7 @@
     legend: { x: 0, y: 1, bgcolor: "rgba(255,255,255,0.8)" },
     scene: {
       aspectmode: "data",
-      camera: { eye: { x: -0.25, y: -1.1, z: 1.25 } },
+      camera: { eye: { x: -0.3, y: -1.3, z: 1.7 } },
       xaxis: { title: { text: "x [m]" } }, yaxis: { title: { text: "y [m]" } },
       zaxis: { title: { text: "z [m]" } },
     },

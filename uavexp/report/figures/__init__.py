@@ -102,10 +102,9 @@ def _tradeoff(study: Study) -> Iterator[Drawing]:
     yield tradeoff.plane(
         panel,
         curves,
-        tradeoff.looks_of_curves(study, curves),
+        looks_of(study, [curve.name for curve in curves]),
         name="tradeoff",
-        about="Success and least clearance against replans per mission, a curve per policy, its points "
-        "labelled by what varies along it.",
+        about="Success and least clearance against replans per mission, a curve per policy.",
         note=_note(study, panel),
     )
 
@@ -125,8 +124,8 @@ def _policies(study: Study) -> Iterator[Drawing]:
 
 def _robustness(study: Study) -> Iterator[Drawing]:
     panel = study_panel(study, (shown.RATE,))
-    drawing = robustness.disturbances(study, _note(study, panel))
-    yield from (drawing,) if drawing else _summary(study)
+    drawings = list(robustness.disturbances(study, _note(study, panel)))
+    yield from drawings or _summary(study)
 
 
 _KINDS: dict[str, Callable[[Study], Iterator[Drawing]]] = {

@@ -66,7 +66,7 @@ def stored(study: Study, flights: pd.DataFrame) -> pd.DataFrame:
     there = flights[(flights["status"] == OK) & flights["world_digest"].isin(worlds)]
     folders = {folder.name for folder in (study.folder / TRIALS).glob("*")}
     there = there[there["trial"].isin(folders)]
-    return there[[study.has_log(trial) for trial in there["trial"]]]
+    return there[there["trial"].map(study.has_log).astype(bool)]
 
 
 def shared_worlds(

@@ -43,13 +43,16 @@ def replan_raster(
     figure = canvas.new_figure(canvas.PAGE_IN, 0.75 + rows * max(1.1, 0.55 + 0.085 * len(seeds)))
     panels = figure.subplots(rows, min(len(arms), 2), sharex=True, sharey=True, squeeze=False).flat
     for axes, arm in zip(panels, arms, strict=False):
-        shown = flights[(flights[ARM] == arm) & flights["seed"].isin(seeds)]
-        _draw_panel(axes, arm, shown, taken[taken["trial"].isin(shown["trial"])], seeds)
+        mine = flights[(flights[ARM] == arm) & flights["seed"].isin(seeds)]
+        _draw_panel(axes, arm, mine, taken[taken["trial"].isin(mine["trial"])], seeds)
+    shown = flights[flights[ARM].isin(arms) & flights["seed"].isin(seeds)]
+    figure.axes[0].set_xlim(0.0, 1.02 * float(shown["completion_time_s"].max()))
     for axes in list(figure.axes)[len(arms) :]:
         axes.set_axis_off()
     figure.supylabel("seed", fontsize=9)
     figure.supxlabel("time [s]", fontsize=9)
-    causes = sorted(taken["cause"].unique(), key=list(style.CAUSE_MARKS).index)
+    known = [cause for cause in style.CAUSE_MARKS if (taken["cause"] == cause).any()]
+    causes = [*known, *sorted(set(taken["cause"]) - set(known))]
     figure.legend(handles=_key(causes), loc="outside upper center", ncols=len(causes) + 2, fontsize=8)
     caption = _caption(arms, scene, [int(seed) for seed in seeds], flights)
     return Drawing(name="figure_9", caption=caption, figure=figure)
@@ -70,13 +73,13 @@ def _draw_panel(
         at = group["trial"].map(flights.set_index("trial")["seed"]).map(row_of)
         axes.plot(group["time_s"], at, zorder=2, **style.marker(str(cause), size_pt) | {"mew": 0.3})
     each = len(taken) / max(len(flights), 1)
-    near = f", {100.0 * taken['near_change'].mean():.0f} % near a change" if len(taken) else ""
+    near = f", {100.0 * taken['near_change'].astype(float).mean():.0f} % near a change" if len(taken) else ""
     axes.set_title(f"{arm}: {each:.1f} replans a flight{near}", fontsize=8, loc="left")
     every = 1 if len(seeds) <= 10 else 5
     axes.set_yticks(
         range(len(seeds)), [str(seed) if row % every == 0 else "" for row, seed in enumerate(seeds)]
     )
-    axes.set(xlim=(0.0, None), ylim=(len(seeds) - 0.4, -0.6))
+    axes.set_ylim(len(seeds) - 0.4, -0.6)
     canvas.tidy(axes, grid="x")
 
 

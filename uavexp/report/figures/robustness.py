@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,21 +26,31 @@ _LOOKS = (PRIMARY, CLOCK, *OTHERS)
 _SPREAD = 0.24  # sideways room of the lines at one level
 
 
-def disturbances(study: Study, note: str) -> Drawing | None:
-    """Draw each metric over the first disturbance, a line per level of the second, a column per the third."""
+def disturbances(study: Study, note: str) -> Iterator[Drawing]:
+    """Draw, for every arm, each metric over the first disturbance by the second and the third."""
     axes = [name for name in (NOISE, LATENCY, DRIFT) if name in study.axes]
+    trials = with_false_triggers(study.trials, study.replans)
     if not axes:
-        return None
-    trials = _of_primary(study, with_false_triggers(study.trials, study.replans))
+        return
+    if ARM not in study.axes:
+        yield _draw(study, trials, axes, "", note)
+        return
+    for arm in sorted(study.axes[ARM], key=lambda name: name != primary_arm(study)):
+        mine = trials[trials[ARM].astype(str) == arm]
+        if len(mine):
+            yield _draw(study, mine, axes, arm, note)
+
+
+def _draw(study: Study, trials: pd.DataFrame, axes: Sequence[str], arm: str, note: str) -> Drawing:
     levels = {axis: arms_flown(trials, {axis: study.axes[axis]}) for axis in axes}
     columns = levels[axes[2]] if len(axes) > 2 else ("",)
     figure = canvas.new_figure(canvas.PAGE_IN, 0.9 + 1.45 * len(METRICS))
     grid = figure.subplots(len(METRICS), len(columns), sharex=True, sharey="row", squeeze=False)
-    for column, level in enumerate(columns):
+    for column, level in zip(grid.T, columns, strict=True):
         chosen = trials[trials[axes[2]].astype(str) == level] if level else trials
-        _draw_column(grid[:, column], chosen, axes[:2], levels)
-        grid[0, column].set_title(f"{axes[2]}: {level}" if level else "", fontsize=8)
-        grid[-1, column].set_xlabel(axes[0])
+        _draw_column(column, chosen, axes[:2], levels)
+        column[0].set_title(f"{axes[2]}: {level}" if level else "", fontsize=8)
+        column[-1].set_xlabel(axes[0])
     for row, metric in zip(grid, METRICS, strict=True):
         row[0].set_ylabel(metric.label.replace(" [", "\n["), fontsize=8)
     grid[0, 0].set_ylim(-3.0, 103.0)
@@ -48,13 +59,12 @@ def disturbances(study: Study, note: str) -> Drawing | None:
         figure.legend(
             handles, labels, title=axes[1], loc="outside upper center", ncols=len(labels), fontsize=8
         )
-    return Drawing(name="disturbances", caption=f"{_caption(study, axes)} {note}", figure=figure)
+    name = "disturbances" if arm in ("", primary_arm(study)) else f"disturbances_{_slug(arm)}"
+    return Drawing(name=name, caption=f"{_caption(arm, axes)} {note}", figure=figure)
 
 
-def _of_primary(study: Study, trials: pd.DataFrame) -> pd.DataFrame:
-    if ARM not in study.axes or primary_arm(study) not in study.axes[ARM]:
-        return trials
-    return trials[trials[ARM].astype(str) == primary_arm(study)]
+def _slug(arm: str) -> str:
+    return re.sub(r"[^a-z0-9]+", "_", arm.lower()).strip("_")
 
 
 def _draw_column(
@@ -90,8 +100,8 @@ def _draw_line(
     )
 
 
-def _caption(study: Study, axes: Sequence[str]) -> str:
-    who = f" of {primary_arm(study)}" if ARM in study.axes else ""
+def _caption(arm: str, axes: Sequence[str]) -> str:
+    who = f" of {arm}" if arm else ""
     return (
         f"Success, least clearance and false triggers{who} over {' by '.join(axes)}, with 95 % intervals "
         "(success: Wilson's with the effective number of flights in clusters; the others: scenes resampled). "

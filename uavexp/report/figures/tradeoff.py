@@ -14,7 +14,7 @@ from uavexp.report import shown
 from uavexp.report.comparison import SCENE, Metric, Panel, estimate
 from uavexp.report.figures import canvas
 from uavexp.report.figures.flown import ARM
-from uavexp.report.figures.looks import Look, clock_arm, looks_of, primary_arm
+from uavexp.report.figures.looks import Look
 from uavexp.report.parts import Drawing
 from uavexp.study import Study
 
@@ -31,21 +31,22 @@ class Curve:
 
     name: str
     arms: tuple[str, ...]
-    labels: tuple[str, ...]
-    joined: bool  # whether one parameter alone varies, so that a line through the points means something
+    labels: tuple[str, ...]  # of the points
+    parameter: str = ""  # that alone varies, so that a line through the points means something
 
 
 def curves_of(study: Study, flights: pd.DataFrame, panel: Panel) -> list[Curve]:
     """Which arms make up the curve of one policy.
 
-    With an axis `setting` the arms that differ in nothing else, else those of one trigger; in
-    both cases only when one parameter of the trigger varies among them or the setting names them.
+    With an axis `setting` the arms that differ in nothing else, without it those of one trigger.
+    Where more than one parameter varies among them without a setting, each arm stands alone.
     """
     first = flights.drop_duplicates(ARM).set_index(ARM).loc[list(panel.arms)]
     by = [axis for axis in study.axes if axis not in (SETTING, SCENE)] if SETTING in first else ["trigger"]
     curves: list[Curve] = []
     for names, group in first.groupby(by, sort=False):
-        curves += _curves_among(", ".join(map(str, names)), group)
+        name = ", ".join(map(str, names))
+        curves += _curves_among(name if SETTING in first else name.upper(), group)
     return curves
 
 
@@ -57,28 +58,15 @@ def _curves_among(name: str, arms: pd.DataFrame) -> list[Curve]:
         labels = tuple(
             f"{value:g}" if isinstance(value, float) else str(value) for value in ordered[varied[0]]
         )
-        full_name = f"{name} over {varied[0].removeprefix('p_trigger_')}"
-        return [Curve(full_name, tuple(ordered.index), labels, joined=True)]
+        return [Curve(name, tuple(ordered.index), labels, varied[0].removeprefix("p_trigger_"))]
     if len(arms) > 1 and SETTING in arms:
-        return [Curve(name, tuple(arms.index), tuple(arms[SETTING].astype(str)), joined=False)]
+        return [Curve(name, tuple(arms.index), tuple(arms[SETTING].astype(str)))]
     return [single(str(arm)) for arm in arms.index]
 
 
 def single(arm: str) -> Curve:
     """An arm by itself, named in the legend."""
-    return Curve(arm.rstrip(", "), (arm,), ("",), joined=False)
-
-
-def looks_of_curves(study: Study, curves: Sequence[Curve]) -> dict[str, Look]:
-    """Look of every curve; the primary policy and the one by the clock keep theirs."""
-    stems = {curve.name: curve.name.partition(" over ")[0] for curve in curves}
-    known = {primary_arm(study).lower(): primary_arm(study), clock_arm(study).lower(): clock_arm(study)}
-    names = {name: known.get(stem.lower(), name) for name, stem in stems.items()}
-    unique = {
-        name: alias if list(names.values()).count(alias) == 1 else name for name, alias in names.items()
-    }
-    looks = looks_of(study, list(unique.values()))
-    return {name: looks[alias] for name, alias in unique.items()}
+    return Curve(arm.rstrip(", "), (arm,), ("",))
 
 
 def plane(
@@ -88,14 +76,22 @@ def plane(
     figure = canvas.new_figure(canvas.PAGE_IN, 3.5)
     sides = figure.subplots(1, 2)
     for axes, metric in zip(sides, (shown.RATE, shown.CLEARANCE), strict=True):
-        for curve in curves:
+        for number, curve in enumerate(curves):
             _draw_curve(axes, panel, metric, curve, looks[curve.name])
+            _draw_labels(axes, panel, metric, curve, below=number % 2 == 0)
         _finish(axes, metric, panel)
     sides[0].set_ylim(-3.0, 103.0)
     columns = min(len(curves), 5)
-    handles, labels = sides[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=columns, fontsize=8, handlelength=2.6)
-    return Drawing(name=name, caption=f"{about} {_CAPTION} {note}", figure=figure)
+    figure.legend(
+        *sides[0].get_legend_handles_labels(),
+        loc="outside upper center",
+        ncols=columns,
+        fontsize=8,
+        handlelength=2.6,
+    )
+    labels = "; ".join(f"{curve.name}: {curve.parameter}" for curve in curves if curve.parameter)
+    points = f" Labels of the points: {labels}." if labels else ""
+    return Drawing(name=name, caption=f"{about}{points} {_CAPTION} {note}", figure=figure)
 
 
 _CAPTION = (
@@ -113,11 +109,17 @@ def _draw_curve(axes: Axes, panel: Panel, metric: Metric, curve: Curve, look: Lo
     y_ends = np.array([item.interval for item in up]).T
     axes.vlines(x, *y_ends, color=look.colour, lw=0.8, alpha=0.55, zorder=2)
     axes.hlines(y, *x_ends, color=look.colour, lw=0.8, alpha=0.55, zorder=2)
-    line = {"lw": 1.1, **look.line} if curve.joined else {"ls": "", "color": look.colour}
+    line = {"lw": 1.1, **look.line} if curve.parameter else {"ls": "", "color": look.colour}
     axes.plot(x, y, marker=look.marker, ms=5.5, mec="white", mew=0.5, zorder=3, label=curve.name, **line)
-    for place, label in zip(zip(x, y, strict=True), curve.labels, strict=True):
-        note = axes.annotate(label, place, (4, 3), textcoords="offset points", fontsize=canvas.SMALL_PT)
-        note.set_path_effects([withStroke(linewidth=1.6, foreground="white")])
+
+
+def _draw_labels(axes: Axes, panel: Panel, metric: Metric, curve: Curve, *, below: bool) -> None:
+    """Write what varies beside each point, for every other curve below it, so that few lie on each other."""
+    for arm, label in zip(curve.arms, curve.labels, strict=True):
+        place = (estimate(panel, shown.REPLANS, arm).mean, estimate(panel, metric, arm).mean)
+        offset_pt = (4, -9 if below else 3)
+        note = axes.annotate(label, place, offset_pt, textcoords="offset points", fontsize=canvas.SMALL_PT)
+        note.set_path_effects([withStroke(linewidth=1.2, foreground="white")])
         note.set_in_layout(False)  # a label at the edge must not shrink the plane
 
 

@@ -1,0 +1,77 @@
+"""A small study of real flights, for tests of what reads study folders."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from uavexp.__main__ import main
+from uavexp.study import STUDY, Study, read_study
+from uavexp.table import REPLANS, TABLE, write_table
+
+STORED = Path(__file__).parent / "data" / "study"
+_SMALL = (
+    "experiments=mcr/table1",
+    "arm=SSP,TBR,MCR",
+    "scene=columns sparse,rooms",
+    "seed=0:2",
+    "vehicle=point_mass",
+    "world.size_m=[10,8,3]",
+    "stuck_s=8",
+)
+
+
+@pytest.fixture(scope="session")
+def flown(tmp_path_factory: pytest.TempPathFactory) -> Study:
+    """A study with logs and worlds: the one in `tests/data`, else twelve short flights."""
+    folder = tmp_path_factory.getbasetemp() / "small-study"
+    if not folder.exists():
+        if (STORED / STUDY).is_file():
+            shutil.copytree(STORED, folder)
+        else:
+            assert main([*_SMALL, f"out={folder}"]) == 0
+    return read_study(folder)
+
+
+def copy_of(study: Study, folder: Path, **changes: Any) -> Study:
+    """The same study in another folder, parts of its `study.json` changed."""
+    shutil.copytree(study.folder, folder)
+    text = json.loads((folder / STUDY).read_text())
+    (folder / STUDY).write_text(json.dumps(text | changes))
+    return read_study(folder)
+
+
+def made_up(
+    folder: Path,
+    trials: pd.DataFrame,
+    axes: dict[str, tuple[str, ...]],
+    *,
+    report: str = "",
+    settings: dict[str, Any] | None = None,
+    replans: pd.DataFrame | None = None,
+) -> Study:
+    """A study folder of tables alone, without logs."""
+    folder.mkdir(parents=True, exist_ok=True)
+    content = {
+        "name": "",
+        "title": "made up",
+        "report": report,
+        "axes": [[name, list(values)] for name, values in axes.items()],
+        "seeds": sorted({int(seed) for seed in trials["seed"]}),
+        "settings": settings or {},
+        "cells": [],
+    }
+    (folder / STUDY).write_text(json.dumps(content))
+    write_table(folder / TABLE, _rows(trials))
+    columns = ("trial", "number", "time_s", "effective_s", "cause", "status", "path_change_m", "near_change")
+    write_table(folder / REPLANS, _rows(replans) if replans is not None else [], columns)
+    return read_study(folder)
+
+
+def _rows(table: pd.DataFrame) -> list[dict[str, Any]]:
+    return table.astype(object).where(table.notna(), None).to_dict("records")

@@ -1,0 +1,135 @@
+"""Jobs on a Dask cluster: the same children as on this machine, one at a time under each worker.
+
+A worker supervises a child per job (`local`), so that limits, crashes and the bytes of a result
+are those of a local sweep. Workers write nothing: results come back over the network, and
+whoever runs the sweep stores them. A job whose child takes the worker itself down is tried on
+as many workers as the scheduler allows (`distributed.scheduler.allowed-failures`), at last
+alone, then counted as killed; the others go on.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import logging
+import multiprocessing
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import CancelledError
+from functools import partial
+from typing import Any
+
+from uavexp.errors import ConfigError, UavexpError
+from uavexp.sweep.faults import failure
+from uavexp.sweep.job import Answer, Call, Done, Job, Limits, Status
+from uavexp.sweep.local import run_local, start_fork_server
+
+_ALLOWED_FAILURES = 1  # workers that one job may take down beyond the first
+_WORKER_MB = 2000  # of a worker itself and its fork server
+_LOST = "the Dask cluster was lost; start it again, and the same command flies what is left"
+
+
+def run_dask(
+    call: Call,
+    jobs: Iterable[Job],
+    *,
+    address: str | None,
+    queue: str | None,
+    n_jobs: int,
+    limits: Limits,
+    preload: Sequence[str] = (),
+) -> Iterator[Done]:
+    """Run jobs on a cluster and yield each when it has ended.
+
+    Closing the iterator cancels what has not begun; workers that were started for this sweep
+    are stopped with all they run, those of a cluster that was there before finish their job.
+
+    Args:
+        call: what to call, importable by name on the workers.
+        jobs: what to run.
+        address: of a scheduler; None starts a cluster for this sweep.
+        queue: None starts it on this machine, "slurm" through dask-jobqueue.
+        n_jobs: workers of a cluster that is started.
+        limits: of each job.
+        preload: modules that each worker's fork server imports.
+
+    Raises:
+        UavexpError: Dask is not installed, or the cluster cannot be reached or is lost.
+    """
+    distributed = _import("distributed")
+    with contextlib.ExitStack() as stack:
+        where = address or stack.enter_context(_cluster(distributed, queue, n_jobs, limits))
+        try:
+            client = stack.enter_context(distributed.Client(where, set_as_default=False))
+        except OSError as error:
+            raise ConfigError(f"runner.address={address}: no Dask scheduler answers ({error})") from error
+        fly = partial(client.submit, _run_on_worker, call, limits=limits, preload=tuple(preload), pure=False)
+        futures = {fly(job, key=job.name): job for job in jobs}
+        stack.callback(client.cancel, list(futures))
+        suspects: list[Job] = []
+        for future in distributed.as_completed(list(futures), loop=client.loop):
+            job = futures.pop(future)
+            done = _done(job, future)
+            if done is None:
+                suspects.append(job)
+            else:
+                yield done
+        for job in suspects:  # a worker's death is laid to all jobs that it held: now each alone
+            future = fly(job, key=f"{job.name} alone")
+            stack.callback(client.cancel, [future])
+            yield _done(job, future) or _killed(job)
+
+
+def _done(job: Job, future: Any) -> Done | None:
+    """What became of a job; None when the workers that held it died."""
+    try:
+        done: Done = future.result()
+    except CancelledError as error:
+        raise UavexpError(_LOST) from error
+    except Exception as error:
+        if type(error).__name__ == "KilledWorker":
+            return None
+        return Done(job=job, answer=failure(error), wall_s=0.0)
+    return done
+
+
+def _killed(job: Job) -> Done:
+    answer = Answer(status=Status.KILLED, reason="every Dask worker that ran it died")
+    return Done(job=job, answer=answer, wall_s=0.0)
+
+
+def _run_on_worker(call: Call, job: Job, *, limits: Limits, preload: tuple[str, ...]) -> Done:
+    """Supervise one job on a worker."""
+    # a worker under Dask's nanny is a daemon, to which multiprocessing denies children; these
+    # cannot be left behind, they die with it (`child`)
+    multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
+    start_fork_server(preload)
+    return next(run_local(call, [job], n_jobs=1, limits=limits))
+
+
+def _cluster(distributed: Any, queue: str | None, n_jobs: int, limits: Limits) -> Any:
+    """A cluster for this sweep, to be closed with it."""
+    _import("dask").config.set({"distributed.scheduler.allowed-failures": _ALLOWED_FAILURES})
+    if queue is None:
+        return distributed.LocalCluster(
+            n_workers=n_jobs,
+            threads_per_worker=1,
+            dashboard_address=None,
+            memory_limit=0,  # each child has its own
+            silence_logs=logging.CRITICAL,  # the death of a worker is told as the end of its job
+        )
+    cluster = slurm_cluster(limits)
+    cluster.scale(n_jobs)
+    return cluster
+
+
+def slurm_cluster(limits: Limits) -> Any:
+    """SLURM jobs of one worker each; partition, account and time come from Dask's `jobqueue.yaml`."""
+    memory_mb = int(limits.memory_mb) + _WORKER_MB
+    return _import("dask_jobqueue").SLURMCluster(cores=1, processes=1, memory=f"{memory_mb}MB")
+
+
+def _import(name: str) -> Any:
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        raise ConfigError(f"runner.backend=dask needs Dask ({error}): pip install 'uavexp[dask]'") from error
