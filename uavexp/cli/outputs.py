@@ -58,7 +58,7 @@ def trial_files(trial: Trial, head: dict[str, Any], wall: dict[str, Any]) -> dic
     arrays = log_arrays(trial.log)
     shown = {**trial.metrics, "seed": trial.seed, "strategy": trial.cell.strategy}
     picture = io.BytesIO()
-    draw(trial.world, trial.log, shown, wall["command"], picture)  # type: ignore[arg-type]
+    draw(trial.world, trial.log, shown, wall["command"], picture)
     return {
         LOG: pack(arrays),
         PICTURE: picture.getvalue(),

@@ -98,13 +98,14 @@ def _fly_plan(plan: Plan, command: Command, runner: Runner, terminal: Terminal, 
     if not plan.left:
         _begin(plan)
     rows = collect(folder)
-    _note_run(folder, {"command": list(typed), "began": began, "flown": kept}, runner)
+    asked = [word for word in typed if not word.startswith("out=")]  # the folder may move
+    _note_run(folder, {"command": asked, "began": began, "flown": kept}, runner)
     terminal.summary(rows, plan)
     if command.experiment is not None:
         from uavexp.report.make import make_report
 
         terminal.say("writing the report ...")
-        terminal.files(make_report(folder), folder)
+        terminal.files(make_report(folder, terminal.say), folder)
     terminal.say(str(folder))
     return 1 if failed else 0
 

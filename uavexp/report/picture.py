@@ -7,7 +7,7 @@ import textwrap
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -29,7 +29,7 @@ DPI = 120
 MOST_POINTS = 4000  # of a curve over time
 
 
-def draw(world: World, log: TrialLog, metrics: Values, title: str, path: Path) -> None:
+def draw(world: World, log: TrialLog, metrics: Values, title: str, path: Path | IO[bytes]) -> None:
     """Write the picture of one trial as a PNG; the same trial gives the same bytes.
 
     Args:
@@ -37,7 +37,7 @@ def draw(world: World, log: TrialLog, metrics: Values, title: str, path: Path) -
         log: the flight; may be empty or a single row (an error before the first step).
         metrics: of `uavexp.metrics.evaluate`, with `seed` and `strategy` when there are any.
         title: the command that repeats the trial.
-        path: of the PNG file to write.
+        path: PNG file to write, or an open one.
     """
     with style.house_style():
         view = plan_view.view_m(world, log)
