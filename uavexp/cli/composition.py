@@ -28,6 +28,8 @@ from uavexp.trust import check_trust
 TRIGGER_GROUP = "trigger"  # what presets choose
 DEFAULT_PRESET = "mcr"  # config.yaml's
 CELL_AXIS = "cell"
+_FEW_CELLS = 8  # up to so many are composed one by one: 0.15 s each
+_OF_ONE_COMPOSITION = ("runtime", "overrides", "job")  # parts of `hydra` that only tell what was typed
 CONFIG_NAME = "config"
 
 
@@ -62,6 +64,7 @@ class Composer:
     options: dict[str, dict[str, Path]] = field(init=False)
     experiments: dict[str, Path] = field(init=False)
     _cache: dict[tuple[tuple[str, str], ...], dict[str, Any]] = field(init=False, repr=False)
+    _many: bool = field(init=False, repr=False, default=False)
 
     def __post_init__(self) -> None:
         folders = [conf_folder(), *([self.user_folder] if self.user_folder else [])]
@@ -81,6 +84,7 @@ class Composer:
         runner = {key: typed.pop(key) for key in list(typed) if key.split(".")[0] == RUNNER_GROUP}
         experiment = self._experiment(ours.get(EXPERIMENT_GROUP))
         labelled, axes = self._grid(experiment, list(typed.values()))
+        self._many = len(labelled) > _FEW_CELLS
         defaults = self.compose([*_single(runner.values()), *labelled[0].settings])
         seed = (
             ours["seed"].values if "seed" in ours else (experiment.seed if experiment else defaults["seed"],)
@@ -187,8 +191,29 @@ class Composer:
     def _compose_options(self, chosen: tuple[tuple[str, str], ...]) -> dict[str, Any]:
         """Hydra's tree of these options, unresolved; once for each combination."""
         if chosen not in self._cache:
-            self._cache[chosen] = self._hydra_compose(dict(chosen))
+            joined = self._join(dict(chosen)) if self._many and len(chosen) > 1 else None
+            self._cache[chosen] = joined or self._hydra_compose(dict(chosen))
         return self._cache[chosen]
+
+    def _join(self, chosen: Mapping[str, str]) -> dict[str, Any] | None:
+        """The tree of several options from trees of one each: a grid needs their sum, not their product.
+
+        None where an option touches more than its own group, or the preset touches that group.
+        """
+        preset = {group: option for group, option in chosen.items() if group in (PRESET_GROUP, TRIGGER_GROUP)}
+        if preset == chosen:
+            return None
+        plain = self._compose_options(())
+        tree = copy.deepcopy(self._compose_options(tuple(sorted(preset.items()))))
+        for group, option in chosen.items():
+            if group in preset:
+                continue
+            alone = self._compose_options(((group, option),))
+            if _without(alone, group) != _without(plain, group) or tree[group] != plain[group]:
+                return None
+            tree[group] = copy.deepcopy(alone[group])
+            tree["hydra"]["runtime"]["choices"][group] = option
+        return tree
 
     def _hydra_compose(self, chosen: Mapping[str, str]) -> dict[str, Any]:
         arguments = [f"{group}={name}" for group, name in chosen.items()]
@@ -279,6 +304,12 @@ def _single(settings: Iterable[Setting]) -> list[Setting]:
         if len(setting.values) != 1:
             raise ConfigError(f"{setting.key} must have one value, it is no part of a grid")
     return found
+
+
+def _without(tree: Mapping[str, Any], group: str) -> dict[str, Any]:
+    """A composed tree without one group, and without what `hydra` tells of the composition itself."""
+    hydra = {key: value for key, value in tree["hydra"].items() if key not in _OF_ONE_COMPOSITION}
+    return {**{key: value for key, value in tree.items() if key != group}, "hydra": hydra}
 
 
 def _refuse_equal_cells(cells: Sequence[Cell]) -> None:

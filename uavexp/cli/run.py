@@ -6,7 +6,8 @@ import contextlib
 import multiprocessing
 import platform
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
@@ -65,25 +66,28 @@ def execute(
 
 
 def _prepare(plan: Plan, runner: Runner, terminal: Terminal) -> None:
-    """Start the fork server; while it imports, find out whether every world can be made."""
+    """Have kernels compiled and the fork server started."""
     alone = len(plan.jobs) == 1
     if not kernels.is_compiled():
         terminal.say("first run: compiling kernels takes about a minute")
         if not alone:
             _compile_kernels(plan.left[0])
-    if not alone:
-        if runner.backend == Backend.LOCAL:
-            start_fork_server([PRELOAD])
-        _check_worlds([job.payload for job in plan.left])
+    if not alone and runner.backend == Backend.LOCAL:
+        start_fork_server([PRELOAD])
 
 
 def _fly_plan(plan: Plan, command: Command, runner: Runner, terminal: Terminal, typed: Sequence[str]) -> int:
     folder, began, failed = plan.study.folder, datetime.now(UTC), 0
     kept = 0
-    with terminal.progress(plan):
+    with (
+        terminal.progress(plan),
+        _worlds_checked(plan) as wait_for_worlds,
+        contextlib.closing(_fly(plan, runner, terminal.watch)) as flying,
+    ):
         try:
-            for done in _fly(plan, runner, terminal.watch):
+            for done in flying:
                 if not kept:
+                    wait_for_worlds()
                     _begin(plan)
                 _keep(folder, done)
                 kept += 1
@@ -110,7 +114,7 @@ def _fly_plan(plan: Plan, command: Command, runner: Runner, terminal: Terminal, 
     return 1 if failed else 0
 
 
-def _fly(plan: Plan, runner: Runner, watch: Watch) -> Iterator[Done]:
+def _fly(plan: Plan, runner: Runner, watch: Watch) -> Generator[Done, None, None]:
     """Fly what is left: each trial in a process of its own, a trial that is all of a command here."""
     if len(plan.jobs) == 1:
         return (_fly_here(job, watch) for job in plan.left)
@@ -170,6 +174,14 @@ def _note_run(folder: Path, run: dict[str, Any], runner: Runner) -> None:
         "machine": f"{platform.system()} {platform.machine()}, {cores()} cores",
     }
     write_text(folder / RUN, canonical_json({"runs": [*read_runs(folder), run]}) + "\n")
+
+
+@contextlib.contextmanager
+def _worlds_checked(plan: Plan) -> Iterator[Callable[[], None]]:
+    """Check the worlds beside the first flights, of which none is kept before this has ended well."""
+    tasks = [job.payload for job in plan.left] if len(plan.jobs) > 1 else []
+    with ThreadPoolExecutor(max_workers=1) as pool:
+        yield pool.submit(_check_worlds, tasks).result
 
 
 def _check_worlds(tasks: Sequence[Task]) -> None:

@@ -87,7 +87,7 @@ class Terminal:
             if self._bar is not None:
                 self._bar.update(self._bar.task_ids[0], words=line)
             elif time.monotonic() - self._last_s > (_PLAIN_PERIOD_S if self._done else _PATIENCE_S):
-                self.say(line)
+                self.say(self._standing() if self._done and self._total > _MOST_LINES else line)
 
     def finished(self, done: Done) -> None:
         """Note that one trial has ended."""

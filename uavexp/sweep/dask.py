@@ -13,7 +13,7 @@ import contextlib
 import importlib
 import logging
 import multiprocessing
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from concurrent.futures import CancelledError
 from functools import partial
 from typing import Any
@@ -37,7 +37,7 @@ def run_dask(
     n_jobs: int,
     limits: Limits,
     preload: Sequence[str] = (),
-) -> Iterator[Done]:
+) -> Generator[Done, None, None]:
     """Run jobs on a cluster and yield each when it has ended.
 
     Closing the iterator cancels what has not begun; workers that were started for this sweep

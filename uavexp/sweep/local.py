@@ -16,7 +16,7 @@ import tempfile
 import threading
 import time
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass, field
 from multiprocessing import forkserver
 from multiprocessing.connection import Connection, wait
@@ -52,7 +52,7 @@ def run_local(
     n_jobs: int,
     limits: Limits,
     watch: Watch | None = None,
-) -> Iterator[Done]:
+) -> Generator[Done, None, None]:
     """Run jobs, so many at a time, and yield each when it has ended.
 
     When the iterator is closed, or the consumer interrupted, the running children are killed.
