@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import pandas as pd
 
 from uavexp.report import shown, style
-from uavexp.report.comparison import Panel
+from uavexp.report.comparison import SCENE, Panel
 from uavexp.report.figures import (
     attribution,
     flown,
@@ -47,7 +47,9 @@ def drawings_of(study: Study) -> Iterator[Drawing]:
 
 def _summary(study: Study) -> Iterator[Drawing]:
     panel = study_panel(study, (shown.RATE,))
-    yield success.success_rates(panel, looks_of(study, panel.arms), _note(study, panel))
+    yield success.success_rates(
+        panel, looks_of(study, panel.arms), _note(study, panel), study.axes.get(SCENE, ())
+    )
 
 
 def _table1(study: Study) -> Iterator[Drawing]:
@@ -56,7 +58,7 @@ def _table1(study: Study) -> Iterator[Drawing]:
     looks, reference = looks_of(study, panel.arms), read_reference(study.name)
     note, threshold_m = _note(study, panel), _safety_threshold_m(flights)
     first, last = _first_and_last(study, flights)
-    yield success.success_rates(panel, looks, note)
+    yield success.success_rates(panel, looks, note, study.axes.get(SCENE, ()))
     for name, shared in (("figure_3", first), ("figure_4", last)):
         if shared:
             yield paths.flight_paths(name, shared, looks)

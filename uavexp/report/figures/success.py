@@ -21,19 +21,20 @@ _MOST_ARMS = 6  # told apart within a scene
 _SPREAD = 0.62  # of a row's height taken by its arms
 
 
-def success_rates(panel: Panel, looks: Mapping[str, Look], note: str) -> Drawing:
-    """Draw success rates with their intervals: by scene and arm, or a row per arm."""
+def success_rates(panel: Panel, looks: Mapping[str, Look], note: str, scenes: Sequence[str] = ()) -> Drawing:
+    """Draw success rates with their intervals: by scene (in the order given) and arm, or a row per arm."""
     by_scene = len(panel.scenes) > 1 and 1 < len(panel.arms) <= _MOST_ARMS
-    return _by_scene(panel, looks, note) if by_scene else _by_arm(panel, looks, note)
+    return _by_scene(panel, looks, note, scenes) if by_scene else _by_arm(panel, looks, note)
 
 
-def _by_scene(panel: Panel, looks: Mapping[str, Look], note: str) -> Drawing:
-    rows = [*panel.scenes, "all scenes"]
+def _by_scene(panel: Panel, looks: Mapping[str, Look], note: str, wanted: Sequence[str]) -> Drawing:
+    scenes = [scene for scene in wanted if scene in panel.scenes] or list(panel.scenes)
+    rows = [*scenes, "all scenes"]
     figure = canvas.new_figure(canvas.PAGE_IN, 1.0 + 0.36 * len(rows))
     axes = figure.add_subplot()
     offsets = np.linspace(-0.5, 0.5, len(panel.arms)) * _SPREAD
     for arm, offset in zip(panel.arms, offsets, strict=True):
-        rates = [_rate_in(panel, arm, scene) for scene in range(len(panel.scenes))]
+        rates = [_rate_in(panel, arm, panel.scenes.index(scene)) for scene in scenes]
         _draw_rates(axes, [*rates, _rate_of(panel, arm)], np.arange(len(rows)) + offset, looks[arm], arm)
     axes.axhline(len(rows) - 1.5, color=canvas.GREY, lw=0.6)
     for edge in range(1, len(rows) - 1):

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 SETTING = "setting"  # axis that tells the cells of one entry apart ("interval_s=2"); made by the command line
+_FULL_PERCENT = 99.9
 _LINEAR_BELOW = 1.0  # replans; a logarithmic axis with room for none at all
 
 
@@ -80,7 +81,7 @@ def plane(
             _draw_curve(axes, panel, metric, curve, looks[curve.name])
             _draw_labels(axes, panel, metric, curve, below=number % 2 == 0)
         _finish(axes, metric, panel)
-    sides[0].set_ylim(-3.0, 103.0)
+    sides[0].set_ylim(_lowest_percent(panel), 102.0)
     columns = min(len(curves), 5)
     figure.legend(
         *sides[0].get_legend_handles_labels(),
@@ -96,8 +97,8 @@ def plane(
 
 _CAPTION = (
     "Bars: 95 % intervals of both means (success: Wilson's with the effective number of flights in clusters; "
-    "the others: scenes resampled). Up and to the left is better. The axis of replans is linear below 1, "
-    "logarithmic above."
+    "the others: scenes resampled). Up and to the left is better. The axis of replans is logarithmic "
+    "(linear below 1, if it begins there)."
 )
 
 
@@ -117,18 +118,33 @@ def _draw_labels(axes: Axes, panel: Panel, metric: Metric, curve: Curve, *, belo
     """Write what varies beside each point, for every other curve below it, so that few lie on each other."""
     for arm, label in zip(curve.arms, curve.labels, strict=True):
         place = (estimate(panel, shown.REPLANS, arm).mean, estimate(panel, metric, arm).mean)
+        if metric is shown.RATE and place[1] > _FULL_PERCENT:
+            continue  # points in a row at the top: the other side tells them apart
         offset_pt = (4, -9 if below else 3)
         note = axes.annotate(label, place, offset_pt, textcoords="offset points", fontsize=canvas.SMALL_PT)
         note.set_path_effects([withStroke(linewidth=1.2, foreground="white")])
         note.set_in_layout(False)  # a label at the edge must not shrink the plane
 
 
+def _lowest_percent(panel: Panel) -> float:
+    """Where the axis of success begins: just below the lowest interval."""
+    lows = [estimate(panel, shown.RATE, arm).interval.low for arm in panel.arms]
+    return max(-2.0, min((low for low in lows if np.isfinite(low)), default=0.0) - 4.0)
+
+
 def _finish(axes: Axes, metric: Metric, panel: Panel) -> None:
-    axes.set_xscale("symlog", linthresh=_LINEAR_BELOW, linscale=0.35)
+    """Scale the axis of replans to what is shown: with room for none at all only if an arm had none."""
+    means = [estimate(panel, shown.REPLANS, arm).mean for arm in panel.arms]
+    least, most = min(means, default=0.0), 1.5 * max([*means, 1.0])
+    if least < 2.0 * _LINEAR_BELOW:
+        axes.set_xscale("symlog", linthresh=_LINEAR_BELOW, linscale=0.35)
+        begin = -0.15
+    else:
+        axes.set_xscale("log")
+        begin = 0.7 * least
     axes.set(xlabel="replans per mission", ylabel=metric.label)
-    most = max((estimate(panel, shown.REPLANS, arm).mean for arm in panel.arms), default=1.0)
-    axes.set_xlim(-0.15, 1.6 * max(most, 1.0))
-    ticks = [tick for tick in (0, 1, 2, 5, 10, 20, 50, 100, 200, 500) if tick <= 1.6 * max(most, 1.0)]
+    axes.set_xlim(begin, most)
+    ticks = [tick for tick in (0, 1, 2, 5, 10, 20, 50, 100, 200, 500) if begin <= tick <= most]
     axes.set_xticks(ticks, [str(tick) for tick in ticks])
     axes.set_xticks([], minor=True)
     canvas.tidy(axes)
