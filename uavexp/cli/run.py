@@ -93,7 +93,7 @@ def _fly_plan(plan: Plan, command: Command, runner: Runner, terminal: Terminal, 
                 kept += 1
                 failed += done.answer.status is not Status.OK
                 terminal.finished(done)
-        except (KeyboardInterrupt, RecordError):
+        except (KeyboardInterrupt, UavexpError):
             with contextlib.suppress(RecordError):
                 if (folder / STUDY).exists():
                     collect(folder)
@@ -115,8 +115,8 @@ def _fly_plan(plan: Plan, command: Command, runner: Runner, terminal: Terminal, 
 
 
 def _fly(plan: Plan, runner: Runner, watch: Watch) -> Generator[Done, None, None]:
-    """Fly what is left: each trial in a process of its own, a trial that is all of a command here."""
-    if len(plan.jobs) == 1:
+    """Fly what is left: each trial in a process of its own, here a trial that is all of a local command."""
+    if len(plan.jobs) == 1 and runner.backend == Backend.LOCAL:
         return (_fly_here(job, watch) for job in plan.left)
     workers = min(runner.workers, max(1, len(plan.left)))
     if runner.backend == Backend.DASK:
@@ -185,7 +185,7 @@ def _worlds_checked(plan: Plan) -> Iterator[Callable[[], None]]:
 
 
 def _check_worlds(tasks: Sequence[Task]) -> None:
-    """Make each distinct world once, so that a bad one is told before the first flight."""
+    """Make the first seed of each distinct world, so that a bad one is told before anything is kept."""
     checked: list[Any] = []
     for task in tasks:
         world = task.cell.config["world"], task.cell.config["world_seed"]

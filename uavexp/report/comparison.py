@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -80,9 +80,14 @@ class Panel:
     columns: dict[str, Float] = field(default_factory=dict)  # metric -> (U, A), NaN: does not exist
 
     @property
+    def scenes_are_units(self) -> bool:
+        """Whether there are scenes enough to be the independent units."""
+        return len(self.scenes) >= FEWEST_SCENES
+
+    @property
     def cluster(self) -> Int:
         """Cluster of each row (U,): its scene, or the same for all where rows are the units."""
-        return self.scene if len(self.scenes) >= FEWEST_SCENES else np.zeros_like(self.scene)
+        return self.scene if self.scenes_are_units else np.zeros_like(self.scene)
 
     def values(self, metric: Metric, arm: str) -> Float:
         """Values (U,) of one arm in the unit shown; NaN where they do not exist."""
@@ -197,6 +202,7 @@ class Pairs:
     second: str
     scene: Int  # (P,)
     cluster: Int  # (P,) as in the panel
+    scenes_are_units: bool  # as in the panel
     columns: dict[str, Float]  # metric -> (P, 2), NaN: does not exist
 
     @cached_property
@@ -219,6 +225,7 @@ def pairs_of(
         second=second,
         scene=panel.scene[rows],
         cluster=panel.cluster[rows],
+        scenes_are_units=panel.scenes_are_units,
         columns={metric.column: panel.columns[metric.column][rows][:, columns] for metric in metrics},
     )
 
@@ -241,6 +248,15 @@ def compare(
     difference = one - two
     if not difference.size:
         return _NO_PAIRS
+    if pairs.scenes_are_units and np.unique(cluster).size < 2:  # nothing of one scene speaks of others
+        return replace(
+            _NO_PAIRS,
+            pairs=difference.size,
+            units=1,
+            first_mean=float(one.mean()),
+            second_mean=float(two.mean()),
+            mean=float(difference.mean()),
+        )
     return Difference(
         pairs=difference.size,
         units=statistics.units_of(cluster),

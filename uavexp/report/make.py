@@ -92,11 +92,18 @@ def _bring_up_to_date(study: Study, say: Say) -> None:
 
 
 def _write_tables(found: Findings, folder: Path) -> Iterator[Path]:
-    (folder / TABLES).mkdir(exist_ok=True)
+    _make_folder(folder / TABLES)
     for table in found.tables:
         yield from _write_table(table, folder / TABLES / table.name)
     for table in found.values:
         yield _write(folder / TABLES / f"{table.name}.csv", tables.to_csv(table))
+
+
+def _make_folder(folder: Path) -> None:
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise RecordError(f"{folder}: cannot be made ({error.strerror})") from error
 
 
 def _write_table(table: Table, stem: Path) -> Iterator[Path]:
@@ -124,7 +131,7 @@ def _write_figures_and_page(study: Study, found: Findings, say: Say) -> Iterator
     from uavexp.report.figures import drawings_of
     from uavexp.report.html import write_html
 
-    (study.folder / FIGURES).mkdir(exist_ok=True)
+    _make_folder(study.folder / FIGURES)
     drawn: list[tuple[Drawing, Path]] = []
     for drawing in _told(drawings_of(study), say):
         png, pdf = _write_figure(drawing, study.folder / FIGURES)

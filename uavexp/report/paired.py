@@ -16,8 +16,8 @@ RULE = (
     "A claimed direction is reproduced when the difference has that sign and its p value (sign flips of "
     "whole scenes, two-sided, Holm-corrected over the comparisons of one metric) is below 0.05; not "
     "reproduced when it has not; not testable without the trials or with so few scenes that no p value "
-    "could be below 0.05. Lengths, times and smoothness are judged where both arms succeeded: a path cut "
-    "short by failure is not a shorter path."
+    "could be below 0.05. Lengths, times, tracking and smoothness are judged where both arms succeeded: a "
+    "path cut short by failure is not a shorter path."
 )
 
 

@@ -12,7 +12,13 @@ TIME = Metric(
 CONTACTS = Metric(column="collision_count", label="Collisions, CC", digits=2, better=-1)
 CLEARANCE = Metric(column="min_clearance_m", label="Min. clearance, MC [m]", digits=3, better=1)
 REPLANS = Metric(column="replans", label="Replans, RF", digits=1, better=-1)
-TRACKING = Metric(column="tracking_error_m", label="Tracking error, TE [m RMSE]", digits=3, better=-1)
+TRACKING = Metric(
+    column="tracking_error_m",
+    label="Tracking error, TE [m RMSE]",
+    digits=3,
+    better=-1,
+    needs_arrival=True,  # after a collision it is the distance from a reference that flies on alone
+)
 
 DETOUR = Metric(column="detour", label="Path / shortest path", digits=2, better=-1, needs_arrival=True)
 UNSAFE = Metric(column="time_below_safety_s", label="Time below safe clearance [s]", digits=2, better=-1)

@@ -103,12 +103,12 @@ def _own_arms(study: Study, panel: Panel) -> list[str]:
     primary, default = str(study.settings.get("primary", "MCR")), study.settings.get("default")
     if default is not None:
         return [arm for arm in panel.arms if arm == f"{primary}, {default}"]
-    return [arm for arm in panel.arms if arm.startswith(primary)]
+    return [arm for arm in panel.arms if arm == primary or arm.startswith(f"{primary}, ")]
 
 
 def _claims(panel: Panel, own: Sequence[str], clock: str, margins: Margins) -> Iterator[Claim]:
-    if all(panel.has(metric) for metric in _JUDGED):
-        for other in (arm for arm in panel.arms if arm.startswith(clock)):
+    if own and all(panel.has(metric) for metric in _JUDGED):
+        for other in (arm for arm in panel.arms if arm.startswith(clock) and arm not in own):
             yield _beats([_rival(panel, arm, other, margins) for arm in own], other, margins)
 
 

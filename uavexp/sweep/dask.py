@@ -64,11 +64,12 @@ def run_dask(
             raise ConfigError(f"runner.address={address}: no Dask scheduler answers ({error})") from error
         fly = partial(client.submit, _run_on_worker, call, limits=limits, preload=tuple(preload), pure=False)
         futures = {fly(job, key=job.name): job for job in jobs}
-        stack.callback(client.cancel, list(futures))
+        stack.callback(lambda: client.cancel(list(futures)))  # those that have not ended
         suspects: list[Job] = []
         for future in distributed.as_completed(list(futures), loop=client.loop):
             job = futures.pop(future)
             done = _done(job, future)
+            future.release()  # or its result stays in the memory of a worker
             if done is None:
                 suspects.append(job)
             else:

@@ -36,9 +36,9 @@ def locked(folder: Path) -> Iterator[None]:
                 f"{folder}: another command (process {holder}) is flying into it; wait for its end, "
                 "or name another folder with out=DIR"
             ) from error
-        file.truncate(0)
-        file.write(str(os.getpid()))
-        file.flush()
+        with contextlib.suppress(OSError):  # a full disk: the lock holds without the number
+            os.ftruncate(file.fileno(), 0)
+            os.write(file.fileno(), str(os.getpid()).encode())
         yield
 
 
