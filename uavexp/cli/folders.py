@@ -57,7 +57,7 @@ def opened(folder: Path) -> Iterator[None]:
                 yield
             finally:
                 if not (folder / STUDY).exists():
-                    (folder / LOCK).unlink()
+                    (folder / LOCK).unlink(missing_ok=True)
     finally:
         for path in (folder / TRIALS, folder / WORLDS, *made):
             try:
