@@ -10,9 +10,8 @@ from uavexp.cli.composition import Composer
 from uavexp.cli.experiment import expand, list_experiments, read_experiment
 from uavexp.cli.overrides import parse_settings
 from uavexp.errors import ConfigError
-from uavexp.paths import experiments_folder
 
-SHIPPED = list_experiments([experiments_folder()])
+SHIPPED = list_experiments()
 TEXT = """
 title: Two ways
 report: table1

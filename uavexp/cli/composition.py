@@ -22,7 +22,7 @@ from uavexp.cli.options import EXPERIMENT_GROUP, PRESET_GROUP, RUNNER_GROUP, lis
 from uavexp.cli.overrides import Setting, expand_grid, expand_seeds, quoted, render
 from uavexp.errors import ConfigError
 from uavexp.parameters import nearest
-from uavexp.paths import conf_folder, experiments_folder
+from uavexp.paths import conf_folder
 from uavexp.trust import check_trust
 
 TRIGGER_GROUP = "trigger"  # what presets choose
@@ -69,8 +69,7 @@ class Composer:
     def __post_init__(self) -> None:
         folders = [conf_folder(), *([self.user_folder] if self.user_folder else [])]
         self.options = list_options(folders)
-        own = [self.user_folder / "experiments"] if self.user_folder else []
-        self.experiments = list_experiments([experiments_folder(), *own])
+        self.experiments = list_experiments(self.user_folder)
         self._cache = {}
 
     def command(self, settings: Sequence[Setting]) -> Command:

@@ -23,7 +23,7 @@ for every cell.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -31,6 +31,7 @@ from typing import Any
 from uavexp.cli.overrides import Setting, expand_grid, flatten, parse_settings, render
 from uavexp.errors import ConfigError
 from uavexp.parameters import nearest
+from uavexp.paths import experiments_folder
 
 SETTING_AXIS = "setting"  # tells the cells of one entry apart
 _KEYS = ("title", "report", "seed", "settings", "fixed", "axes")
@@ -58,8 +59,9 @@ class LabelledCell:
     settings: tuple[Setting, ...]
 
 
-def list_experiments(folders: Iterable[Path]) -> dict[str, Path]:
-    """File of every experiment by its name, `<paper>/<table>`."""
+def list_experiments(user_folder: Path | None = None) -> dict[str, Path]:
+    """File of every experiment by its name, `<paper>/<table>`: the shipped ones, then the user's."""
+    folders = [experiments_folder(), *([user_folder / "experiments"] if user_folder else [])]
     return {
         f"{file.parent.name}/{file.stem}": file
         for folder in folders

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from uavexp.cli.experiment import list_experiments, title_of
 from uavexp.cli.options import PRESET_GROUP, Option, list_options, read_option
-from uavexp.paths import PACKAGE, conf_folder, experiments_folder
+from uavexp.paths import PACKAGE, conf_folder
 
 USAGE = """\
 uavexp flies seeded trials of UAV navigation in unknown indoor spaces.
@@ -61,8 +61,7 @@ def help_text(user_folder: Path | None = None, group: str | None = None) -> str:
 
 
 def _experiment_lines(user_folder: Path | None) -> list[str]:
-    own = [user_folder / "experiments"] if user_folder else []
-    files = list_experiments([experiments_folder(), *own])
+    files = list_experiments(user_folder)
     return [f"  {name:<26} {title_of(name, file)}" for name, file in files.items()]
 
 
