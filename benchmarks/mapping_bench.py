@@ -21,7 +21,7 @@ from uavexp.mapping.voxel_block_grid import VoxelBlockGrid
 from uavexp.scene import Scene
 from uavexp.seeding import Stream, generator
 from uavexp.sensor.rgbd import Rgbd
-from uavexp.types import Float, Scan, State, World
+from uavexp.types import DepthScan, Float, State, World
 from uavexp.world.warehouse import Warehouse
 
 SPEED_MPS = 1.2
@@ -48,7 +48,7 @@ def scipy_ms(occupied: np.ndarray, repeats: int = 3) -> float:
 
 
 def measure(
-    backend: MapBackend, bounds_m: Float, scans: list[Scan], scans_per_update: int = 2
+    backend: MapBackend, bounds_m: Float, scans: list[DepthScan], scans_per_update: int = 2
 ) -> dict[str, float]:
     """Fuse the scans, updating the ESDF after every `scans_per_update`-th, and time it all.
 
@@ -90,7 +90,7 @@ def measure(
     }
 
 
-def scans_along(world: World, sensor: Rgbd, seed: int = 0) -> list[Scan]:
+def scans_along(world: World, sensor: Rgbd, seed: int = 0) -> list[DepthScan]:
     """Scans of a flight along the shortest path at constant speed, looking ahead."""
     sensor.reset(Scene(world), generator(seed, Stream.SENSOR))
     path = world.shortest_path

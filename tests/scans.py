@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from uavexp.types import Float, Scan
+from uavexp.types import DepthScan, Float
 
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]  # lower and upper corner, m
 
@@ -27,7 +27,7 @@ def take_scan(
     focal_px: float = 48.0,
     max_range_m: float = 5.0,
     noise: np.random.Generator | None = None,
-) -> Scan:
+) -> DepthScan:
     """Depth image of solid boxes, with the axial noise of Nguyen et al. 2012 if asked for."""
     height, width = size_px
     rotation = camera_rotation(yaw_rad, pitch_rad)
@@ -47,7 +47,7 @@ def take_scan(
     if noise is not None:
         near = np.minimum(depth, 10.0)
         depth = depth + noise.normal(size=depth.shape) * (0.0012 + 0.0019 * (near - 0.4) ** 2)
-    return Scan(
+    return DepthScan(
         time_s=0.0,
         depth_m=np.where(depth > max_range_m, np.inf, depth).astype(np.float32),
         focal_px=(focal_px, focal_px),

@@ -31,6 +31,8 @@ GROUPS = (
     "controller",
     "vehicle",
     "safety",
+    "movers",
+    "detection",
     "mission",
 )
 TOP_LEVEL: dict[str, Any] = {

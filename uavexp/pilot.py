@@ -208,6 +208,7 @@ class Pilot:
             goal=goal,
             field=observation.field,
             flight_bounds_m=self.flight_bounds_m,
+            tracks=observation.tracks,
         )
 
     def _planned_state(self, time_s: float) -> tuple[Float, Float, Float]:

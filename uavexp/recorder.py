@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import numpy as np
 from scipy import ndimage
 
+from uavexp.bodies import distance_m
 from uavexp.mapping.base import OCCUPIED, DistanceField
 from uavexp.scene import Scene
 from uavexp.trigger.validity import clearance_ahead_m
 from uavexp.types import (
+    Bodies,
     Contact,
     Float,
     Limits,
@@ -23,6 +25,7 @@ from uavexp.types import (
     Reference,
     Replan,
     State,
+    Tracks,
     TrialLog,
     World,
 )
@@ -55,9 +58,14 @@ class Recorder:
     steps: list[tuple[float, Float, Float, Float, Float, Float, Float]] = field(default_factory=list)
     ticks: list[tuple[float, float, int, float, float]] = field(default_factory=list)
     goals_m: list[Float] = field(default_factory=list)
+    bodies: list[Bodies] = field(default_factory=list)  # one per step
+    tracks: list[Tracks] = field(default_factory=list)  # one per ESDF update
 
-    def step(self, time_s: float, state: State, estimate: State, reference: Reference) -> None:
+    def step(
+        self, time_s: float, state: State, estimate: State, reference: Reference, bodies: Bodies
+    ) -> None:
         """Add the row of one simulation step."""
+        self.bodies.append(bodies)
         self.steps.append(
             (
                 time_s,
@@ -81,6 +89,7 @@ class Recorder:
         self.ticks.append(
             (observation.time_s, clearance_m, changed, score, remaining_clearance_m(observation))
         )
+        self.tracks.append(observation.tracks)
         goal = observation.goal
         if goal is not None and not (self.goals_m and np.array_equal(self.goals_m[-1], goal.position_m)):
             self.goals_m.append(goal.position_m)
@@ -113,6 +122,10 @@ class Recorder:
         )
         tick_s, esdf_m, changed, score, remaining_m = zip(*self.ticks, strict=True)
         mapped = np.flatnonzero(field.state == OCCUPIED)
+        fixed_m, mover_m = (
+            scene.fixed_distance_m(np.stack(position)),
+            _mover_distance_m(position, self.bodies),
+        )
         return TrialLog(
             outcome=outcome,
             reason=reason,
@@ -124,7 +137,7 @@ class Recorder:
             estimated_position_m=np.stack(estimated),
             reference_position_m=np.stack(reference),
             reference_acceleration_mps2=np.stack(acceleration),
-            clearance_m=scene.distance_m(np.stack(position)),
+            clearance_m=np.minimum(fixed_m, mover_m) if mover_m.size else fixed_m,
             tick_s=np.array(tick_s),
             esdf_clearance_m=np.array(esdf_m),
             changed_voxels=np.array(changed, dtype=np.int64),
@@ -137,8 +150,23 @@ class Recorder:
             seen_share=seen_share,
             body_radius_m=body_radius_m,
             mapped_m=field.voxel_centres_m(mapped).astype(np.float32),
+            mover_shape=self.bodies[0].shape,
+            mover_half_size_m=self.bodies[0].half_size_m,
+            mover_position_m=np.stack([bodies.position_m for bodies in self.bodies]).astype(np.float32),
+            mover_clearance_m=mover_m,
+            track_count=np.array([len(tracks) for tracks in self.tracks], dtype=np.int64),
+            track_identity=np.concatenate([tracks.identity for tracks in self.tracks]),
+            track_position_m=np.concatenate([tracks.position_m for tracks in self.tracks]),
+            track_velocity_mps=np.concatenate([tracks.velocity_mps for tracks in self.tracks]),
             wall_s={name: np.array(laps) for name, laps in watch.laps_s.items()},
         )
+
+
+def _mover_distance_m(position_m: Sequence[Float], bodies: Sequence[Bodies]) -> Float:
+    """Distance (T,) of the body's centre to the nearest mover, step by step; empty without movers."""
+    if not len(bodies[0]):
+        return np.zeros(0)
+    return np.array([distance_m(now, point[None])[0] for now, point in zip(bodies, position_m, strict=True)])
 
 
 def remaining_clearance_m(observation: Observation) -> float:

@@ -11,20 +11,21 @@ from typing import cast
 import numpy as np
 
 from uavexp import triangle_grid
+from uavexp.bodies import distance_m
 from uavexp.o3d import open3d
-from uavexp.types import Float, Float32, Int32, World
+from uavexp.types import Bodies, Float, Float32, Int32, World
 
 _THREADS = 1  # records must not depend on the machine
 
 
 class Scene:
-    """The true geometry of a world; immutable after construction.
+    """The true geometry of a world: fixed surfaces, and the movers where they were last placed.
 
     Args:
         world: its `vertices_m` and `triangles`; none at all means empty space.
     """
 
-    __slots__ = ("_grid", "_raycasting", "_triangles", "_vertices")
+    __slots__ = ("_grid", "_raycasting", "_triangles", "_vertices", "bodies")
 
     def __init__(self, world: World) -> None:
         self._build(world.vertices_m, world.triangles)
@@ -41,11 +42,16 @@ class Scene:
         self._triangles = np.ascontiguousarray(triangles, dtype=np.int32)
         self._grid: triangle_grid.TriangleGrid | None = None
         self._raycasting = None
+        self.bodies = Bodies.none()
         if self._triangles.shape[0] > 0:
             self._raycasting = open3d.t.geometry.RaycastingScene(nthreads=_THREADS)
             self._raycasting.add_triangles(
                 open3d.core.Tensor(self._vertices), open3d.core.Tensor(self._triangles.astype(np.uint32))
             )
+
+    def place(self, bodies: Bodies) -> None:
+        """Put the movers where they are now."""
+        self.bodies = bodies
 
     def cast(self, rays: Float32) -> tuple[Float32, Float32]:
         """Intersect rays with the nearest surface.
@@ -64,7 +70,12 @@ class Scene:
         return hits["t_hit"].numpy(), hits["primitive_normals"].numpy()
 
     def distance_m(self, points_m: Float) -> Float:
-        """Unsigned distance (N,) of points (N, 3) to the nearest surface, m; inf in empty space."""
+        """Unsigned distance (N,) of points (N, 3) to the nearest surface or mover, m; inf in empty space."""
+        fixed_m = self.fixed_distance_m(points_m)
+        return np.minimum(fixed_m, distance_m(self.bodies, points_m)) if len(self.bodies) else fixed_m
+
+    def fixed_distance_m(self, points_m: Float) -> Float:
+        """The same to fixed surfaces alone."""
         if self._raycasting is None:
             return np.full(points_m.shape[0], np.inf)
         distance = self._raycasting.compute_distance(_tensor(points_m), nthreads=_THREADS)

@@ -17,6 +17,7 @@ class Stream(IntEnum):
     ESTIMATOR = 2
     MOVERS = 3
     PLANNER = 4
+    DETECTION = 5
 
 
 def generator(seed: int, stream: Stream) -> np.random.Generator:

@@ -9,12 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from uavexp.controller.base import Controller
+from uavexp.detection.base import Detection
 from uavexp.errors import require, require_non_negative, require_positive
 from uavexp.estimator.base import Estimator
 from uavexp.explorer.base import Explorer
 from uavexp.geometry import quaternion_from_yaw
 from uavexp.mapping.base import MapBackend
 from uavexp.mission.base import Mission
+from uavexp.movers.base import Movers
 from uavexp.pilot import Pilot
 from uavexp.planner.base import Planner
 from uavexp.recorder import Recorder, Stopwatch, seen_share
@@ -23,7 +25,7 @@ from uavexp.scene import Scene
 from uavexp.seeding import Stream, generator
 from uavexp.sensor.base import Sensor
 from uavexp.trigger.base import TriggerPolicy
-from uavexp.types import MapUpdate, Observation, Outcome, Reference, State, TrialLog, World
+from uavexp.types import MapUpdate, Observation, Outcome, Reference, State, Tracks, TrialLog, World
 from uavexp.vehicle.base import Vehicle
 from uavexp.vehicle.contact import ContactTracker
 from uavexp.world.base import WorldGenerator
@@ -45,6 +47,8 @@ class Parts:
     controller: Controller
     vehicle: Vehicle
     safety: Safety
+    movers: Movers
+    detection: Detection
     mission: Mission
     world_seed: int | None = None  # of the layout alone; None: the trial's seed
     step_s: float = 0.01
@@ -128,28 +132,34 @@ def fly(parts: Parts, world: World, seed: int, progress: Progress | None = None)
     last_step = math.ceil(parts.mission.time_limit_s / parts.step_s)
     stuck_steps = math.ceil(parts.stuck_s / parts.step_s)
     outcome: Outcome | None = None
+    tracks = Tracks.none()
 
     for step in range(last_step + 1):
         time_s = step * parts.step_s
+        bodies = parts.movers.at(time_s)
+        scene.place(bodies)
         if step % period["sensor.rate_hz"] == 0:
             with watch.lap("sense"):
                 scan = parts.sensor.capture(state, estimate, time_s)
+            if len(bodies):
+                with watch.lap("detect"):
+                    scan, tracks = parts.detection.detect(scan, parts.mapping.field, bodies)
             with watch.lap("integrate"):
                 parts.mapping.integrate(scan)
         reference = pilot.reference(time_s, parts.step_s)
         if step % period["mapping.esdf_rate_hz"] == 0:
             with watch.lap("esdf"):
                 update = parts.mapping.update(time_s)
-        observation = _observe(parts, pilot, time_s, estimate, reference, update)
+        observation = _observe(parts, pilot, time_s, estimate, reference, update, tracks)
         if step % period["explorer.rate_hz"] == 0:
             pilot.explore(observation)
-            observation = _observe(parts, pilot, time_s, estimate, reference, update)
+            observation = _observe(parts, pilot, time_s, estimate, reference, update, tracks)
         if step % period["mapping.esdf_rate_hz"] == 0:
             recorder.tick(observation, pilot.decide(observation))
         if step % period["controller.rate_hz"] == 0:
             with watch.lap("control"):
                 command = parts.controller.command(estimate, reference)
-        recorder.step(time_s, state, estimate, reference)
+        recorder.step(time_s, state, estimate, reference, bodies)
         outcome = parts.mission.outcome(state.position_m, observation)
         if outcome is None and step % 100 == 0 and recorder.moved_m(stuck_steps) < 0.3:
             outcome = Outcome.STUCK if pilot.ever_planned else Outcome.NO_PLAN
@@ -180,6 +190,8 @@ def _hover(world: World) -> State:
 def _reset(parts: Parts, world: World, scene: Scene, start: State, seed: int, watch: Stopwatch) -> Pilot:
     """Give every part its trial's context and its own random stream."""
     limits = parts.vehicle.limits
+    parts.movers.reset(world, scene, limits, generator(seed, Stream.MOVERS))
+    parts.detection.reset(limits, generator(seed, Stream.DETECTION))
     parts.sensor.reset(scene, generator(seed, Stream.SENSOR))
     parts.estimator.reset(generator(seed, Stream.ESTIMATOR))
     parts.mapping.reset(world.bounds_m)
@@ -213,7 +225,13 @@ def _reset(parts: Parts, world: World, scene: Scene, start: State, seed: int, wa
 
 
 def _observe(
-    parts: Parts, pilot: Pilot, time_s: float, estimate: State, reference: Reference, update: MapUpdate
+    parts: Parts,
+    pilot: Pilot,
+    time_s: float,
+    estimate: State,
+    reference: Reference,
+    update: MapUpdate,
+    tracks: Tracks,
 ) -> Observation:
     return Observation(
         time_s=time_s,
@@ -226,6 +244,7 @@ def _observe(
         best_goal=pilot.best_goal,
         target_m=parts.mission.target_m,
         flight_bounds_m=pilot.flight_bounds_m,
+        tracks=tracks,
     )
 
 

@@ -7,9 +7,10 @@ Shapes stand beside the types.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass, field
-from enum import StrEnum
+from enum import IntEnum, StrEnum
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -58,6 +59,7 @@ class Reference:
     acceleration_mps2: Float  # (3,)
     yaw_rad: float
     yaw_rate_radps: float = 0.0
+    jerk_mps3: Float = field(default_factory=lambda: np.zeros(3))  # (3,)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -122,7 +124,7 @@ class Trajectory:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Scan:
+class DepthScan:
     """One depth image with the pose it is believed to be taken from.
 
     Depth is along the optical axis: finite and > 0 is a return; +inf was measured to lie
@@ -146,6 +148,108 @@ class Scan:
             raise ValueError("camera_rotation must be a rotation")
         if not min(self.focal_px) > 0.0:
             raise ValueError(f"focal_px must be > 0, got {self.focal_px}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RayScan:
+    """Ranges along single rays (a LiDAR), with the pose they are believed to be taken from.
+
+    Range is along the ray: finite and > 0 is a return; +inf was measured to lie beyond
+    `max_range_m` (free up to there); NaN is no measurement (tells nothing).
+    """
+
+    time_s: float
+    origin_m: Float  # (3,) world
+    direction: Float32  # (N, 3) world, unit length
+    range_m: Float32  # (N,)
+    max_range_m: float
+
+    def __post_init__(self) -> None:
+        _check_shape("origin_m", self.origin_m, (3,))
+        _check_shape("direction", self.direction, (None, 3))
+        _check_shape("range_m", self.range_m, (self.direction.shape[0],))
+        if not np.isfinite(self.origin_m).all():
+            raise ValueError("origin_m must be finite")
+
+
+Scan = DepthScan | RayScan
+
+
+class Shape(IntEnum):
+    """Form of a mover; cylinders stand upright, boxes are axis-aligned."""
+
+    SPHERE = 0
+    CYLINDER = 1
+    BOX = 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bodies:
+    """The moving obstacles at one instant, in truth; the same ones in the same order all flight long."""
+
+    time_s: float
+    shape: UInt8  # (B,) values of `Shape`
+    half_size_m: Float  # (B, 3); a sphere's is its radius thrice, a cylinder's (r, r, half height)
+    position_m: Float  # (B, 3) centres
+    velocity_mps: Float  # (B, 3)
+
+    def __post_init__(self) -> None:
+        count = len(self.shape)
+        for name in ("half_size_m", "position_m", "velocity_mps"):
+            _check_shape(name, getattr(self, name), (count, 3))
+
+    def __len__(self) -> int:
+        return len(self.shape)
+
+    @classmethod
+    def none(cls, time_s: float = 0.0) -> Bodies:
+        """No body at all."""
+        return cls(
+            time_s=time_s,
+            shape=np.zeros(0, dtype=np.uint8),
+            half_size_m=np.zeros((0, 3)),
+            position_m=np.zeros((0, 3)),
+            velocity_mps=np.zeros((0, 3)),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tracks:
+    """The moving obstacles as the vehicle believes them, with constant velocity ahead."""
+
+    time_s: float
+    identity: Int  # (N,) stays with a track while it lives
+    position_m: Float  # (N, 3) centres
+    velocity_mps: Float  # (N, 3)
+    covariance: Float  # (N, 6, 6) of position and velocity, SI
+    half_size_m: Float  # (N, 3) of an upright box around the mover
+    dropped: int = 0  # filters given up so far because they diverged
+
+    def __post_init__(self) -> None:
+        count = len(self.identity)
+        for name in ("position_m", "velocity_mps", "half_size_m"):
+            _check_shape(name, getattr(self, name), (count, 3))
+        _check_shape("covariance", self.covariance, (count, 6, 6))
+
+    def __len__(self) -> int:
+        return len(self.identity)
+
+    @classmethod
+    def none(cls, time_s: float = 0.0) -> Tracks:
+        """No track at all."""
+        return cls(
+            time_s=time_s,
+            identity=np.zeros(0, dtype=np.int64),
+            position_m=np.zeros((0, 3)),
+            velocity_mps=np.zeros((0, 3)),
+            covariance=np.zeros((0, 6, 6)),
+            half_size_m=np.zeros((0, 3)),
+        )
+
+    def predicted_m(self, times_s: Float) -> Float:
+        """Centres (N, K, 3) at absolute times (K,), at constant velocity from `time_s`."""
+        ahead_s = np.asarray(times_s, dtype=np.float64) - self.time_s
+        return self.position_m[:, None] + ahead_s[None, :, None] * self.velocity_mps[:, None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -197,6 +301,9 @@ class PlanRequest:
     goal: Goal
     field: DistanceField  # map at the time of the request
     flight_bounds_m: Float  # (2, 3)
+    tracks: Tracks = dataclasses.field(
+        default_factory=Tracks.none
+    )  # believed movers at the time of the request
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -209,6 +316,8 @@ class PlanResult:
     reason: str = ""
     iterations: int = 0  # of the solver
     expansions: int = 0  # of the graph search
+    collision_checks: int = 0  # of sampling planners
+    history: Float = field(default_factory=lambda: np.zeros((0, 2)))  # (K, 2) iteration, best cost so far
     wall_search_s: float = 0.0
     wall_optimise_s: float = 0.0
 
@@ -234,6 +343,7 @@ class Observation:
     best_goal: Goal | None  # the explorer's latest choice g*
     target_m: Float | None  # (3,) mission target; None when exploring
     flight_bounds_m: Float  # (2, 3)
+    tracks: Tracks = dataclasses.field(default_factory=Tracks.none)  # movers believed to be there
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -320,6 +430,7 @@ class Contact:
     start_s: float
     end_s: float
     position_m: Float  # (3,) body centre at first touch
+    mover: int = -1  # index of the mover that was touched first; -1: a fixed surface
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -354,6 +465,24 @@ class TrialLog:
     # one row per ESDF update again: least mapped distance over the rest of the flown trajectory;
     # NaN where nothing is left of one, empty when it was not measured
     remaining_clearance_m: Float = field(default_factory=lambda: np.zeros(0))  # (M,)
+    # movers, in truth: one row per step again
+    mover_shape: UInt8 = field(default_factory=lambda: np.zeros(0, dtype=np.uint8))  # (B,) `Shape`
+    mover_half_size_m: Float = field(default_factory=lambda: np.zeros((0, 3)))  # (B, 3)
+    mover_position_m: Float32 = field(
+        default_factory=lambda: np.zeros((0, 0, 3), dtype=np.float32)
+    )  # (T, B, 3)
+    mover_clearance_m: Float = field(default_factory=lambda: np.zeros(0))  # (T,) body centre to nearest mover
+    # movers, as believed: one row per ESDF update and track, ESDF updates one after the other
+    track_count: Int = field(default_factory=lambda: np.zeros(0, dtype=np.int64))  # (M,)
+    track_identity: Int = field(default_factory=lambda: np.zeros(0, dtype=np.int64))  # (S,)
+    track_position_m: Float = field(default_factory=lambda: np.zeros((0, 3)))  # (S, 3)
+    track_velocity_mps: Float = field(default_factory=lambda: np.zeros((0, 3)))  # (S, 3)
+    # the first plan, for studies of planners: searched path, trajectory, (iteration, best cost so far)
+    plan_path_m: Float = field(default_factory=lambda: np.zeros((0, 3)))  # (P, 3)
+    plan_breaks_s: Float = field(default_factory=lambda: np.zeros(0))  # (K+1,); empty without a plan
+    plan_coefficients: Float = field(default_factory=lambda: np.zeros((0, 0, 3)))  # (K, D+1, 3)
+    plan_history: Float = field(default_factory=lambda: np.zeros((0, 2)))  # (H, 2)
+    plan_collision_checks: int = 0
     body_radius_m: float = math.nan  # circle around the body: a trajectory nearer than this is blocked
     # clock times, never part of the record: name -> seconds of each call
     wall_s: dict[str, Float] = field(default_factory=dict)

@@ -15,7 +15,7 @@ from uavexp.paths import PACKAGE
 LAYERS = (
     {"errors"},
     {"types", "kernel_cache", "__init__"},
-    {"seeding", "geometry", "o3d", "triangle_grid", "scene", "paths"},
+    {"seeding", "geometry", "o3d", "triangle_grid", "bodies", "scene", "paths"},
     {"roles", "metrics"},
     {"recorder", "pilot", "trial", "parameters", "trust", "records", "logs", "table", "worlds", "study"},
     {"sweep", "report"},

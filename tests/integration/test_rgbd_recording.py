@@ -12,7 +12,7 @@ from scipy.ndimage import distance_transform_edt
 
 from tests.contract.test_mapping_contract import OPTIONS, build
 from uavexp.mapping.base import FREE, OCCUPIED, UNKNOWN, MapBackend
-from uavexp.types import Float, Scan
+from uavexp.types import DepthScan, Float
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
 FOLDER = DATA / "rgbd" / "sevenscenes_a"
@@ -28,12 +28,12 @@ def recording() -> dict:
     return next(item for item in items if item["id"] == "sevenscenes_a")
 
 
-def read_scan(frame: int, poses: dict[int, Float], camera: Float) -> Scan:
+def read_scan(frame: int, poses: dict[int, Float], camera: Float) -> DepthScan:
     image = matplotlib.image.imread(FOLDER / f"{frame:06d}.depth.png")
     millimetres = np.rint(image[STEP // 2 :: STEP, STEP // 2 :: STEP] * 65535.0)
     depth = np.where((millimetres > 0) & (millimetres < 65535), millimetres / 1000.0, np.nan)
     left, _, right = np.linalg.svd(poses[frame][:, :3])  # printed with 9 digits: make it a rotation
-    return Scan(
+    return DepthScan(
         time_s=0.0,
         depth_m=np.where(depth > RANGE_M, np.inf, depth).astype(np.float32),
         focal_px=(camera[0, 0] / STEP, camera[1, 1] / STEP),
@@ -45,7 +45,7 @@ def read_scan(frame: int, poses: dict[int, Float], camera: Float) -> Scan:
 
 
 @pytest.fixture(scope="module")
-def scans() -> tuple[list[Scan], list[Scan]]:
+def scans() -> tuple[list[DepthScan], list[DepthScan]]:
     table = np.loadtxt(FOLDER / "poses.txt")
     poses = {int(row[0]): row[1:].reshape(3, 4) for row in table}
     camera = np.loadtxt(FOLDER / "intrinsics.txt")
@@ -73,7 +73,7 @@ def maps(scans) -> dict[str, MapBackend]:
     return built
 
 
-def measured_points(scan: Scan) -> Float:
+def measured_points(scan: DepthScan) -> Float:
     """World points (N, 3) of all returns."""
     v, u = np.nonzero(np.isfinite(scan.depth_m))
     depth = scan.depth_m[v, u].astype(np.float64)

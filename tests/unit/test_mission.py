@@ -14,7 +14,7 @@ from uavexp.mission.explore import Explore
 from uavexp.mission.goto import Goto
 from uavexp.recorder import Recorder, seen_share
 from uavexp.scene import Scene
-from uavexp.types import Observation, Outcome, Reference, State, World
+from uavexp.types import Bodies, Observation, Outcome, Reference, State, World
 from uavexp.world.random_columns import RandomColumns
 
 
@@ -56,7 +56,7 @@ def test_standing_still_is_measured_over_the_whole_window() -> None:
     )
     for step in range(1001):
         moved = replace(state, position_m=np.array([min(step, 500) * 0.01, 0.0, 0.0]))
-        recorder.step(step * 0.01, moved, moved, reference)
+        recorder.step(step * 0.01, moved, moved, reference, Bodies.none())
         if step < 400:
             assert math.isinf(recorder.moved_m(400))
     assert recorder.moved_m(400) == 0.0

@@ -19,7 +19,7 @@ from uavexp.mapping.base import DistanceField
 from uavexp.mapping.frustum import column_depths, frustum_box
 from uavexp.mapping.occupancy import OccupancyMap, Rule, enlist, judge, keeps_free
 from uavexp.mapping.parameters import MapParameters
-from uavexp.types import Float, Float32, Int32, MapUpdate, Scan, UInt8
+from uavexp.types import DepthScan, Float, Float32, Int32, MapUpdate, UInt8
 
 _NEAR_M = 1e-3  # nothing is nearer to the camera than this
 
@@ -159,7 +159,7 @@ class Dense(MapParameters):
         """Declare a ball known free as far as it is unknown; measured surfaces override it."""
         self._live().mark_free(centre_m, radius_m)
 
-    def integrate(self, scan: Scan) -> None:
+    def integrate(self, scan: DepthScan) -> None:
         """Fuse one scan."""
         grid = self._live()
         grid.changed = integrate_scan(

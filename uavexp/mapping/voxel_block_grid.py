@@ -32,7 +32,7 @@ from uavexp.mapping.frustum import column_depths, frustum_box
 from uavexp.mapping.occupancy import OccupancyMap, Rule, enlist, judge, keeps_free
 from uavexp.mapping.parameters import MapParameters
 from uavexp.o3d import open3d
-from uavexp.types import Bool, Float, Float32, Int32, MapUpdate, Scan, UInt8
+from uavexp.types import Bool, DepthScan, Float, Float32, Int32, MapUpdate, UInt8
 
 _EDGE = 8  # voxels along a block
 _BLOCK = _EDGE**3
@@ -219,7 +219,7 @@ class VoxelBlockGrid(MapParameters):
         """Declare a ball known free as far as it is unknown; measured surfaces override it."""
         self._live().mark_free(centre_m, radius_m)
 
-    def integrate(self, scan: Scan) -> None:
+    def integrate(self, scan: DepthScan) -> None:
         """Fuse one scan."""
         grid = self._live()
         intrinsics = np.array([*scan.focal_px, *scan.centre_px])
@@ -263,7 +263,7 @@ class VoxelBlockGrid(MapParameters):
                     "NVIDIA GPU and the package open3d in place of open3d-cpu (never both), or device=CPU:0"
                 )
 
-    def _fuse(self, scan: Scan, blocks: Int32, corner: Float) -> None:
+    def _fuse(self, scan: DepthScan, blocks: Int32, corner: Float) -> None:
         """Let Open3D integrate the scan into `blocks`."""
         core = open3d.core
         height, width = scan.depth_m.shape

@@ -31,7 +31,7 @@ import numpy as np
 from uavexp.errors import require, require_non_negative, require_positive
 from uavexp.geometry import rotation_from_quaternion
 from uavexp.scene import Scene
-from uavexp.types import Float, Float32, Scan, State
+from uavexp.types import DepthScan, Float, Float32, State
 
 
 @nb.njit(cache=True)
@@ -213,7 +213,7 @@ class Rgbd:
         down = np.array([math.sin(pitch), 0.0, -math.cos(pitch)])
         self._body_from_camera = np.stack([np.array([0.0, -1.0, 0.0]), down, forward], axis=1)
 
-    def capture(self, true_state: State, estimated_state: State, time_s: float) -> Scan:
+    def capture(self, true_state: State, estimated_state: State, time_s: float) -> DepthScan:
         """Measure from the true pose; the scan carries the pose believed (estimated)."""
         position, rotation = self._camera_pose(true_state)
         _aim(self._directions, position, rotation, self._rays)
@@ -235,7 +235,7 @@ class Rgbd:
             float(self.edge_missing_probability) if self.edge_missing else 0.0,
             math.cos(math.radians(self.grazing_angle_deg)) if self.grazing_missing else 0.0,
         )
-        return Scan(
+        return DepthScan(
             time_s=time_s,
             depth_m=depth,
             focal_px=(self.focal_px, self.focal_px),
