@@ -92,7 +92,7 @@ def read_log(path: Path) -> TrialLog:
     arrays = unpack(path)
     try:
         return _log_of(arrays)
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, IndexError, TypeError) as error:
         raise RecordError(f"{path}: no log ({error})") from error
 
 
@@ -127,14 +127,15 @@ def _event_arrays(prefix: str, kind: type, events: Sequence[Any]) -> Arrays:
 
 
 def _events(prefix: str, kind: type, arrays: Arrays) -> list[dict[str, Any]]:
+    names = [name for name in _names(kind) if f"{prefix}.{name}" in arrays]  # older logs have fewer
     columns: dict[str, list[Any]] = {}
-    for name in _names(kind):
+    for name in names:
         array = arrays[f"{prefix}.{name}"]
         if name in _RAGGED:
             columns[name] = np.split(array, np.cumsum(arrays[f"{prefix}.{name}.count"])[:-1])
         else:
             columns[name] = list(array) if array.ndim > 1 else array.tolist()
-    count = len(arrays[f"{prefix}.{_names(kind)[0]}"])
+    count = len(arrays[f"{prefix}.{names[0]}"])
     return [{name: column[index] for name, column in columns.items()} for index in range(count)]
 
 

@@ -78,6 +78,7 @@ class Pilot:
     best_goal: Goal | None = None
     replans: list[Replan] = field(default_factory=list)
     dropped_triggers: int = 0
+    first_plan: PlanResult | None = None  # the first that was found
     failure: str = ""  # reason of the last failed request, "" after a success
     _pending: _Pending | None = None
     _moves_s: float = -math.inf  # until then the flown trajectory only turns
@@ -169,6 +170,7 @@ class Pilot:
             result = self._plan(observation, goal)
             self._note(cause, score, observation, goal, result, fired)
             if result.trajectory is not None:
+                self.first_plan = self.first_plan or result
                 self._accept(result.trajectory, goal, observation)
                 return
             self.failure = f"{result.status.value}: {result.reason}"

@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from scipy import ndimage
@@ -22,6 +23,7 @@ from uavexp.types import (
     Limits,
     Observation,
     Outcome,
+    PlanResult,
     Reference,
     Replan,
     State,
@@ -113,7 +115,8 @@ class Recorder:
         dropped_triggers: int,
         contacts: tuple[Contact, ...],
         seen_share: float,
-        body_radius_m: float = math.nan,
+        first_plan: PlanResult | None,
+        limits: Limits,
         watch: Stopwatch,
     ) -> TrialLog:
         """Return the finished log; true clearances are measured here, all at once."""
@@ -148,7 +151,10 @@ class Recorder:
             contacts=contacts,
             goals_m=np.array(self.goals_m).reshape(-1, 3),
             seen_share=seen_share,
-            body_radius_m=body_radius_m,
+            **_plan_fields(first_plan),
+            max_speed_mps=limits.max_speed_mps,
+            max_acceleration_mps2=limits.max_acceleration_mps2,
+            body_radius_m=limits.body_radius_m,
             mapped_m=field.voxel_centres_m(mapped).astype(np.float32),
             mover_shape=self.bodies[0].shape,
             mover_half_size_m=self.bodies[0].half_size_m,
@@ -160,6 +166,19 @@ class Recorder:
             track_velocity_mps=np.concatenate([tracks.velocity_mps for tracks in self.tracks]),
             wall_s={name: np.array(laps) for name, laps in watch.laps_s.items()},
         )
+
+
+def _plan_fields(plan: PlanResult | None) -> dict[str, Any]:
+    """The log's fields on the first plan; those of a flight without one keep their defaults."""
+    if plan is None or plan.trajectory is None:
+        return {}
+    return {
+        "plan_path_m": plan.path_m,
+        "plan_breaks_s": plan.trajectory.breaks_s,
+        "plan_coefficients": plan.trajectory.coefficients,
+        "plan_history": plan.history,
+        "plan_collision_checks": plan.collision_checks,
+    }
 
 
 def _mover_distance_m(position_m: Sequence[Float], bodies: Sequence[Bodies]) -> Float:

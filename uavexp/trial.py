@@ -268,7 +268,8 @@ def _log(
         replans=tuple(pilot.replans),
         dropped_triggers=pilot.dropped_triggers,
         contacts=contact.contacts,
-        body_radius_m=parts.vehicle.limits.body_radius_m,
+        first_plan=pilot.first_plan,
+        limits=parts.vehicle.limits,
         seen_share=seen_share(world, scene, parts.mapping.field, parts.vehicle.limits)
         if exploring
         else math.nan,

@@ -276,6 +276,7 @@ class Goal:
     position_m: Float  # (3,)
     is_target: bool  # the mission's target itself (arrive at rest) or a frontier
     score: float  # the explorer's, higher is better
+    yaw_rad: float = math.nan  # to arrive with (a viewpoint's); NaN: the pilot looks ahead
 
 
 class PlanStatus(StrEnum):
@@ -365,6 +366,7 @@ class Outcome(StrEnum):
 
     REACHED = "reached"  # within the tolerance of the target, in truth
     EXPLORED = "explored"  # no reachable frontier is left
+    INSPECTED = "inspected"  # every viewpoint was visited or found unreachable
     TIMEOUT = "timeout"  # the mission's time limit passed
     NO_PLAN = "no_plan"  # no plan was ever found from the start
     STUCK = "stuck"  # holding, and every goal has been tried and failed
@@ -387,6 +389,20 @@ class Difficulty:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Surface:
+    """A reference map: what was known of a building before the flight, and what of it to inspect."""
+
+    vertices_m: Float32  # (V, 3)
+    triangles: Int32  # (F, 3)
+    inspected: Bool  # (F,) whether the triangle is to be seen
+
+    def __post_init__(self) -> None:
+        _check_shape("vertices_m", self.vertices_m, (None, 3))
+        _check_shape("triangles", self.triangles, (None, 3))
+        _check_shape("inspected", self.inspected, (self.triangles.shape[0],))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class World:
     """True geometry and a task in it."""
 
@@ -401,6 +417,7 @@ class World:
     shortest_path: Float  # (P, 3) true shortest path, start to target
     difficulty: Difficulty
     digest: str  # sha256 over geometry and task
+    reference: Surface | None = None  # the map known before the flight, where there is one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -483,6 +500,18 @@ class TrialLog:
     plan_coefficients: Float = field(default_factory=lambda: np.zeros((0, 0, 3)))  # (K, D+1, 3)
     plan_history: Float = field(default_factory=lambda: np.zeros((0, 2)))  # (H, 2)
     plan_collision_checks: int = 0
+    max_speed_mps: float = math.nan  # the limits that plans have to keep
+    max_acceleration_mps2: float = math.nan
+    # inspection: one row per cell of the reference's surface to be seen, one per viewpoint of the first tour
+    cell_m: Float32 = field(default_factory=lambda: np.zeros((0, 3), dtype=np.float32))  # (C, 3)
+    cell_seen_s: Float = field(default_factory=lambda: np.zeros(0))  # (C,) first time seen; inf: never
+    cell_visible: Bool = field(
+        default_factory=lambda: np.zeros(0, dtype=np.bool_)
+    )  # (C,) from anywhere allowed
+    viewpoint_m: Float = field(default_factory=lambda: np.zeros((0, 3)))  # (V, 3) in the order planned
+    viewpoint_yaw_rad: Float = field(default_factory=lambda: np.zeros(0))  # (V,)
+    viewpoint_segment: Int = field(default_factory=lambda: np.zeros(0, dtype=np.int64))  # (V,)
+    viewpoint_visited_s: Float = field(default_factory=lambda: np.zeros(0))  # (V,) inf: never
     body_radius_m: float = math.nan  # circle around the body: a trajectory nearer than this is blocked
     # clock times, never part of the record: name -> seconds of each call
     wall_s: dict[str, Float] = field(default_factory=dict)

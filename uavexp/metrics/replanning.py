@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -67,6 +68,17 @@ class Blocked:
     answer_s: float  # time of the first planning request in between; NaN: none
     contact: bool  # whether it ended by contact
 
+    def holds(self, time_s: float) -> bool:
+        """Whether a request at this time falls into the episode."""
+        return self.first_s <= time_s < self.until_s
+
+
+class Delay(NamedTuple):
+    """How long the flown trajectory had been blocked when a plan was asked for; NaN: it was not."""
+
+    blocked_since_s: float  # the ESDF update that showed it first
+    delay_s: float  # from there to the request
+
 
 def blocked_episodes(log: TrialLog) -> tuple[Blocked, ...]:
     """Episodes in which what was left of the flown trajectory led through a mapped obstacle.
@@ -89,9 +101,24 @@ def blocked_episodes(log: TrialLog) -> tuple[Blocked, ...]:
 
 def _episode(log: TrialLog, first_s: float, clear_s: float) -> Blocked:
     contact_s = min((c.start_s for c in log.contacts if first_s <= c.start_s < clear_s), default=math.inf)
-    until_s = min(clear_s, contact_s)
-    requests_s = [replan.time_s for replan in log.replans if first_s <= replan.time_s < until_s]
-    return Blocked(first_s, until_s, min(requests_s, default=math.nan), contact_s < clear_s)
+    episode = Blocked(first_s, min(clear_s, contact_s), math.nan, contact_s < clear_s)
+    requests_s = [replan.time_s for replan in log.replans if episode.holds(replan.time_s)]
+    return replace(episode, answer_s=min(requests_s, default=math.nan))
+
+
+def request_delays(log: TrialLog) -> tuple[Delay, ...]:
+    """The delay of every planning request of a log, in order; NaN where nothing was blocked or measured.
+
+    The request that answers an episode is the first of those with its `blocked_since_s`; later
+    ones ask again while the same trajectory, or the next, is blocked still.
+    """
+    episodes = blocked_episodes(log)
+    return tuple(_delay(replan.time_s, episodes) for replan in log.replans)
+
+
+def _delay(time_s: float, episodes: Sequence[Blocked]) -> Delay:
+    since_s = next((item.first_s for item in episodes if item.holds(time_s)), math.nan)
+    return Delay(since_s, time_s - since_s)
 
 
 def blocked_delays(log: TrialLog) -> dict[str, int | float]:

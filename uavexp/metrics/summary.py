@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from uavexp.metrics import clearance, path, replanning, smoothness, tracking
+from uavexp.metrics import clearance, path, plan, replanning, smoothness, tracking
 from uavexp.types import Outcome, TrialLog, World
 
 Metrics = dict[str, bool | int | float | str]
@@ -38,6 +38,7 @@ def evaluate(
         **_replanning(log, useful_change_m),
         **_tracking(log),
         **_smoothness(log),
+        **plan.measures(log, world),
         "seen_share": float(log.seen_share),
     }
 

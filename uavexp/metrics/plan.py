@@ -1,0 +1,72 @@
+"""The first plan of a flight, as planned: its length, limits and clearance, whatever was flown.
+
+A limit is checked on a grid of 1 ms over the whole trajectory. A violation is one unbroken
+stretch of it on which a norm exceeds its limit (‖v‖ <= v_max, ‖a‖ <= a_max) by more than a
+millionth; paper 4 counts "violations" and does not say of what [ours].
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from uavexp.geometry import evaluate
+from uavexp.scene import Scene
+from uavexp.types import Bool, Float, Trajectory, TrialLog, World
+
+GRID_S = 1e-3
+_EXCESS = 1.0 + 1e-6
+
+
+def planned(log: TrialLog) -> Trajectory | None:
+    """The first plan's trajectory; None when there was none."""
+    if not log.plan_breaks_s.size:
+        return None
+    return Trajectory(breaks_s=log.plan_breaks_s, coefficients=log.plan_coefficients, at_rest=True)
+
+
+def measures(log: TrialLog, world: World) -> dict[str, float]:
+    """Figures of the first plan, by name; every one is NaN when there was none."""
+    trajectory = planned(log)
+    if trajectory is None:
+        return dict.fromkeys(_NAMES, float("nan"))
+    count = int(np.ceil(trajectory.duration_s / GRID_S)) + 1
+    times_s = np.linspace(trajectory.start_s, trajectory.end_s, count)
+    position_m, velocity_mps, acceleration_mps2 = evaluate(trajectory, times_s)
+    speed_mps = np.linalg.norm(velocity_mps, axis=1)
+    size_mps2 = np.linalg.norm(acceleration_mps2, axis=1)
+    clearance_m = Scene(world).fixed_distance_m(position_m)
+    over = (speed_mps > _EXCESS * log.max_speed_mps) | (size_mps2 > _EXCESS * log.max_acceleration_mps2)
+    values = (
+        _length_m(log.plan_path_m),
+        _length_m(position_m),
+        trajectory.duration_s,
+        float(speed_mps.max()),
+        float(size_mps2.max()),
+        float(stretches(over)),
+        float(clearance_m.min()),
+        float(stretches(clearance_m < log.body_radius_m)),
+        float(log.plan_collision_checks),
+    )
+    return dict(zip(_NAMES, values, strict=True))
+
+
+_NAMES = (
+    "plan_path_length_m",
+    "plan_length_m",
+    "plan_duration_s",
+    "plan_max_speed_mps",
+    "plan_max_acceleration_mps2",
+    "limit_violations",
+    "plan_min_clearance_m",  # true, of the body's centre to fixed surfaces
+    "plan_collisions",  # stretches on which that is less than the body's radius
+    "plan_collision_checks",
+)
+
+
+def stretches(flags: Bool) -> int:
+    """Number of unbroken runs of True in flags (N,)."""
+    return int(np.count_nonzero(np.diff(flags.astype(np.int8), prepend=0) == 1))
+
+
+def _length_m(points_m: Float) -> float:
+    return float(np.linalg.norm(np.diff(points_m, axis=0), axis=1).sum())
