@@ -14,6 +14,7 @@ from uavexp.scene import Scene
 from uavexp.types import Bool, Float, Trajectory, TrialLog, World
 
 GRID_S = 1e-3
+CHECKPOINTS = tuple(n * 10**k for k in range(1, 6) for n in (1, 2, 5))  # iterations
 _EXCESS = 1.0 + 1e-6
 
 
@@ -46,6 +47,7 @@ def measures(log: TrialLog, world: World) -> dict[str, float]:
         float(clearance_m.min()),
         float(stretches(clearance_m < log.body_radius_m)),
         float(log.plan_collision_checks),
+        float(log.replans[0].iterations) if log.replans else float("nan"),
     )
     return dict(zip(_NAMES, values, strict=True))
 
@@ -60,7 +62,24 @@ _NAMES = (
     "plan_min_clearance_m",  # true, of the body's centre to fixed surfaces
     "plan_collisions",  # stretches on which that is less than the body's radius
     "plan_collision_checks",
+    "plan_iterations",
 )
+
+
+def costs(log: TrialLog) -> dict[str, float]:
+    """Cost of the best plan after so many iterations; none for a planner that keeps no history.
+
+    NaN where there was no plan yet, or the search had ended.
+    """
+    if not len(log.plan_history):
+        return {}
+    iteration, cost = log.plan_history.T
+    return {f"plan_cost_at_{at}": _cost_at(iteration, cost, at) for at in CHECKPOINTS}
+
+
+def _cost_at(iteration: Float, cost: Float, at: int) -> float:
+    known = int(np.searchsorted(iteration, at, side="right"))
+    return float(cost[known - 1]) if known and at <= iteration[-1] else float("nan")
 
 
 def stretches(flags: Bool) -> int:

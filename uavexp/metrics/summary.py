@@ -39,6 +39,7 @@ def evaluate(
         **_tracking(log),
         **_smoothness(log),
         **plan.measures(log, world),
+        **plan.costs(log),
         "seen_share": float(log.seen_share),
     }
 

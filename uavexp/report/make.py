@@ -13,7 +13,7 @@ from typing import IO, Any
 
 from uavexp.errors import RecordError
 from uavexp.records import RECORD, write_atomically, write_text
-from uavexp.report import policies, robustness, style, summary, table1, tables, tradeoff
+from uavexp.report import arms, policies, robustness, style, summary, table1, tables, tradeoff
 from uavexp.report.findings import Findings
 from uavexp.report.parts import Drawing, Table
 from uavexp.study import Study, collect, read_study, trial_folders
@@ -33,6 +33,7 @@ _KINDS: dict[str, Callable[[Study], Findings]] = {
     "tradeoff": tradeoff.findings,
     "policies": policies.findings,
     "robustness": robustness.findings,
+    "arms": arms.findings,
     "": summary.findings,
 }
 

@@ -92,3 +92,21 @@ FURTHER = (
 )
 
 COMPARED = (*TABLE_1, UNSAFE, ACCELERATION, JERK, NEAR_CHANGE)
+
+# the first plan of a flight, as planned
+PLANS = (
+    Metric(column="limit_violations", label="Limit violations of the plan", digits=2, better=-1),
+    Metric(column="plan_max_speed_mps", label="Max. planned speed [m/s]", digits=2),
+    Metric(column="plan_max_acceleration_mps2", label="Max. planned acceleration [m/s²]", digits=2),
+    Metric(column="plan_collisions", label="Collisions of the plan", digits=2, better=-1),
+    Metric(column="plan_min_clearance_m", label="Least true clearance of the plan [m]", digits=2, better=1),
+    Metric(column="plan_length_m", label="Length of the plan [m]", digits=2, better=-1),
+    Metric(column="plan_path_length_m", label="Length of the searched path [m]", digits=2, better=-1),
+    Metric(column="plan_duration_s", label="Duration of the plan [s]", digits=2, better=-1),
+    Metric(column="plan_iterations", label="Iterations", digits=0),
+    Metric(column="plan_collision_checks", label="Collision checks", digits=0, better=-1),
+    Metric(column="wall_search_sum_s", label="Search time [ms]", digits=1, better=-1, scale=1e3),
+    Metric(column="wall_optimise_sum_s", label="Smoothing time [ms]", digits=1, better=-1, scale=1e3),
+)
+
+BY_COLUMN = {metric.column: metric for metric in (*TABLE_1, *FURTHER, *PLANS)}

@@ -7,9 +7,11 @@ from collections.abc import Callable, Iterator
 import pandas as pd
 
 from uavexp.report import shown, style
+from uavexp.report.arms import metrics_of
 from uavexp.report.comparison import SCENE, Panel
 from uavexp.report.figures import (
     attribution,
+    convergence,
     flown,
     over_time,
     paths,
@@ -20,6 +22,7 @@ from uavexp.report.figures import (
     success,
     tradeoff,
 )
+from uavexp.report.figures.arms import metric_panels
 from uavexp.report.figures.looks import clock_arm, looks_of, primary_arm
 from uavexp.report.findings import circumstances, study_panel
 from uavexp.report.parts import Drawing
@@ -130,11 +133,21 @@ def _robustness(study: Study) -> Iterator[Drawing]:
     yield from drawings or _summary(study)
 
 
+def _arms(study: Study) -> Iterator[Drawing]:
+    metrics = metrics_of(study)
+    panel = study_panel(study, metrics)
+    looks, note = looks_of(study, panel.arms), _note(study, panel)
+    yield metric_panels(panel, metrics, read_reference(study.name), looks, note)
+    falling = convergence.convergence(study, panel.arms, looks, note)
+    yield from (falling,) if falling else ()
+
+
 _KINDS: dict[str, Callable[[Study], Iterator[Drawing]]] = {
     "table1": _table1,
     "tradeoff": _tradeoff,
     "policies": _policies,
     "robustness": _robustness,
+    "arms": _arms,
     "": _summary,
 }
 
