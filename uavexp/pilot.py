@@ -101,7 +101,7 @@ class Pilot:
         ahead_s = max(time_s, self._moves_s) + self.yaw_lookahead_s
         ahead_s = min(ahead_s, max(time_s, self.trajectory.end_s))
         position, velocity, acceleration = evaluate(self.trajectory, np.array([time_s, ahead_s]))
-        rate_radps = self._turn(position[1] - position[0], step_s)
+        rate_radps = self._turn(self._bearing_rad(position[1] - position[0]), step_s)
         return Reference(
             position_m=position[0],
             velocity_mps=velocity[0],
@@ -125,11 +125,19 @@ class Pilot:
         self.yaw_rad = wrap_angle(self.yaw_rad + self.look_around_radps * step_s)
         return self._hold(self._planned_state(math.inf)[0], self.look_around_radps)
 
-    def _turn(self, ahead_m: Float, step_s: float) -> float:
-        """Turn the yaw towards the path ahead; return the rate, rad/s."""
+    def _bearing_rad(self, ahead_m: Float) -> float:
+        """Where to look: as the goal asks, else along the path ahead; NaN: as before."""
+        if self.best_goal is not None and math.isfinite(self.best_goal.yaw_rad):
+            return self.best_goal.yaw_rad
         if math.hypot(ahead_m[0], ahead_m[1]) < _AHEAD_M:
+            return math.nan
+        return math.atan2(ahead_m[1], ahead_m[0])
+
+    def _turn(self, bearing_rad: float, step_s: float) -> float:
+        """Turn the yaw towards a bearing; return the rate, rad/s."""
+        if math.isnan(bearing_rad):
             return 0.0
-        error_rad = float(wrap_angle(math.atan2(ahead_m[1], ahead_m[0]) - self.yaw_rad))
+        error_rad = float(wrap_angle(bearing_rad - self.yaw_rad))
         rate_radps = min(max(4.0 * error_rad, -self.yaw_rate_radps), self.yaw_rate_radps)
         self.yaw_rad = wrap_angle(self.yaw_rad + rate_radps * step_s)
         return rate_radps
@@ -233,10 +241,10 @@ class Pilot:
         """
         times_s = trajectory.start_s + np.array([0.0, self.yaw_lookahead_s])
         position, velocity, _ = evaluate(trajectory, times_s)
-        ahead_m = position[1] - position[0]
-        if float(np.linalg.norm(velocity[0])) > _REST_MPS or math.hypot(ahead_m[0], ahead_m[1]) < _AHEAD_M:
+        bearing_rad = self._bearing_rad(position[1] - position[0])
+        if float(np.linalg.norm(velocity[0])) > _REST_MPS or math.isnan(bearing_rad):
             return 0.0
-        error_rad = abs(float(wrap_angle(math.atan2(ahead_m[1], ahead_m[0]) - self.yaw_rad)))
+        error_rad = abs(float(wrap_angle(bearing_rad - self.yaw_rad)))
         return max(0.0, error_rad - self.turn_first_rad) / self.yaw_rate_radps
 
     def _note(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
@@ -117,6 +117,7 @@ class Recorder:
         seen_share: float,
         first_plan: PlanResult | None,
         limits: Limits,
+        mission: Mapping[str, Any],
         watch: Stopwatch,
     ) -> TrialLog:
         """Return the finished log; true clearances are measured here, all at once."""
@@ -152,6 +153,7 @@ class Recorder:
             goals_m=np.array(self.goals_m).reshape(-1, 3),
             seen_share=seen_share,
             **_plan_fields(first_plan),
+            **mission,
             max_speed_mps=limits.max_speed_mps,
             max_acceleration_mps2=limits.max_acceleration_mps2,
             body_radius_m=limits.body_radius_m,

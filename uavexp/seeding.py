@@ -18,6 +18,7 @@ class Stream(IntEnum):
     MOVERS = 3
     PLANNER = 4
     DETECTION = 5
+    MISSION = 6
 
 
 def generator(seed: int, stream: Stream) -> np.random.Generator:

@@ -118,6 +118,7 @@ def fly_trial(parts: Parts, seed: int, progress: Progress | None = None) -> tupl
     """
     layout = seed if parts.world_seed is None else parts.world_seed
     world = parts.world.generate(generator(layout, Stream.WORLD))
+    world = parts.mission.prepare(world, generator(seed, Stream.MISSION))
     return world, fly(parts, world, seed, progress)
 
 
@@ -160,7 +161,7 @@ def fly(parts: Parts, world: World, seed: int, progress: Progress | None = None)
             with watch.lap("control"):
                 command = parts.controller.command(estimate, reference)
         recorder.step(time_s, state, estimate, reference, bodies)
-        outcome = parts.mission.outcome(state.position_m, observation)
+        outcome = parts.mission.outcome(state, observation)
         if outcome is None and step % 100 == 0 and recorder.moved_m(stuck_steps) < 0.3:
             outcome = Outcome.STUCK if pilot.ever_planned else Outcome.NO_PLAN
         if outcome is Outcome.EXPLORED and not pilot.ever_planned:
@@ -194,17 +195,18 @@ def _reset(parts: Parts, world: World, scene: Scene, start: State, seed: int, wa
     parts.detection.reset(limits, generator(seed, Stream.DETECTION))
     parts.sensor.reset(scene, generator(seed, Stream.SENSOR))
     parts.estimator.reset(generator(seed, Stream.ESTIMATOR))
-    parts.mapping.reset(world.bounds_m)
+    parts.mapping.reset(world.bounds_m, scene)
     parts.mapping.mark_free(world.start_m, parts.start_bubble_m)
-    parts.explorer.reset(float(world.start_m[2]), limits)
     parts.trigger.reset(limits)
     parts.planner.reset(limits, generator(seed, Stream.PLANNER))
     parts.controller.reset(limits, parts.vehicle.mass_kg)
     parts.vehicle.reset(start)
     parts.safety.reset(limits)
-    parts.mission.reset(world)
+    parts.mission.reset(world, scene, limits)
+    guide = parts.mission.guide(parts.explorer)
+    guide.reset(float(world.start_m[2]), limits)
     return Pilot(
-        explorer=parts.explorer,
+        explorer=guide,
         trigger=parts.trigger,
         planner=parts.planner,
         safety=parts.safety,
@@ -270,6 +272,7 @@ def _log(
         contacts=contact.contacts,
         first_plan=pilot.first_plan,
         limits=parts.vehicle.limits,
+        mission=parts.mission.findings(),
         seen_share=seen_share(world, scene, parts.mapping.field, parts.vehicle.limits)
         if exploring
         else math.nan,
@@ -278,7 +281,7 @@ def _log(
 
 
 def _reason(parts: Parts, pilot: Pilot, outcome: Outcome) -> str:
-    if outcome in (Outcome.REACHED, Outcome.EXPLORED):
+    if outcome in (Outcome.REACHED, Outcome.EXPLORED, Outcome.INSPECTED):
         return ""
     if outcome is Outcome.TIMEOUT:
         return f"not there after {parts.mission.time_limit_s:g} s"

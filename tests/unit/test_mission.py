@@ -28,21 +28,31 @@ def at(time_s: float, *, goal: bool = True) -> Observation:
     return observe(field, change(field, field), time_s=time_s, best=goal_at(1.0) if goal else None)
 
 
+def hover(position_m: np.ndarray) -> State:
+    zero = np.zeros(3)
+    return State(
+        position_m=position_m,
+        velocity_mps=zero,
+        quaternion_wxyz=np.array([1.0, 0.0, 0.0, 0.0]),
+        body_rate_radps=zero,
+    )
+
+
 def test_reached_is_within_the_tolerance_in_truth(hall: World) -> None:
     mission = Goto(tolerance_m=0.3)
-    mission.reset(hall)
+    mission.reset(hall, Scene(hall), LIMITS)
     direction = np.array([0.6, 0.0, 0.8])
-    assert mission.outcome(hall.target_m + 0.299 * direction, at(1.0)) is Outcome.REACHED
-    assert mission.outcome(hall.target_m + 0.301 * direction, at(1.0)) is None
+    assert mission.outcome(hover(hall.target_m + 0.299 * direction), at(1.0)) is Outcome.REACHED
+    assert mission.outcome(hover(hall.target_m + 0.301 * direction), at(1.0)) is None
     assert mission.time_limit_s == pytest.approx(60.0 + 5.0 * hall.difficulty.shortest_path_m)
 
 
 def test_explored_is_no_goal_for_the_patience(hall: World) -> None:
     mission = Explore(patience_s=2.0)
-    mission.reset(hall)
+    mission.reset(hall, Scene(hall), LIMITS)
     assert mission.target_m is None
     position = hall.start_m
-    answers = [mission.outcome(position, at(t, goal=t < 3.0)) for t in np.arange(0.0, 6.0, 0.1)]
+    answers = [mission.outcome(hover(position), at(t, goal=t < 3.0)) for t in np.arange(0.0, 6.0, 0.1)]
     first = next(n for n, answer in enumerate(answers) if answer is Outcome.EXPLORED)
     assert first * 0.1 == pytest.approx(2.9 + 2.0, abs=0.11)
 

@@ -7,7 +7,7 @@ from uavexp.types import Outcome, TrialLog, World
 
 Metrics = dict[str, bool | int | float | str]
 
-ARRIVED = (Outcome.REACHED, Outcome.EXPLORED)
+ARRIVED = (Outcome.REACHED, Outcome.EXPLORED, Outcome.INSPECTED)
 
 
 def evaluate(

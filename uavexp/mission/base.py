@@ -2,16 +2,28 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Any, Protocol
 
-from uavexp.types import Float, Observation, Outcome, World
+import numpy as np
+
+from uavexp.explorer.base import Explorer
+from uavexp.scene import Scene
+from uavexp.types import Float, Limits, Observation, Outcome, State, World
 
 
 class Mission(Protocol):
-    """Judges progress; built fresh for every trial."""
+    """Sets the task and judges progress; built fresh for every trial."""
 
-    def reset(self, world: World) -> None:
+    def prepare(self, world: World, rng: np.random.Generator) -> World:
+        """Return the world as it really is at the start: this one, unless the mission changes it."""
+        ...
+
+    def reset(self, world: World, scene: Scene, limits: Limits) -> None:
         """Begin a trial in `world`."""
+        ...
+
+    def guide(self, explorer: Explorer) -> Explorer:
+        """Return who chooses the goals: the explorer, unless the mission knows better."""
         ...
 
     @property
@@ -24,6 +36,10 @@ class Mission(Protocol):
         """Flight time after which the mission has timed out."""
         ...
 
-    def outcome(self, true_position_m: Float, observation: Observation) -> Outcome | None:
-        """How the flight ended, or None while it goes on."""
+    def outcome(self, true_state: State, observation: Observation) -> Outcome | None:
+        """How the flight ended, or None while it goes on; asked at every step."""
+        ...
+
+    def findings(self) -> dict[str, Any]:
+        """Fields of the `TrialLog` that only this mission knows; none for most."""
         ...

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
 
 from uavexp.errors import require_non_negative, require_positive
-from uavexp.types import Float, Observation, Outcome, World
+from uavexp.explorer.base import Explorer
+from uavexp.scene import Scene
+from uavexp.types import Float, Limits, Observation, Outcome, State, World
 
 
 @dataclass(slots=True, kw_only=True)
@@ -22,7 +27,19 @@ class Explore:
         require_positive(patience_s=self.patience_s, time_base_s=self.time_base_s)
         require_non_negative(time_per_area_spm2=self.time_per_area_spm2)
 
-    def reset(self, world: World) -> None:
+    def prepare(self, world: World, rng: np.random.Generator) -> World:
+        """The world as it is."""
+        return world
+
+    def guide(self, explorer: Explorer) -> Explorer:
+        """The explorer."""
+        return explorer
+
+    def findings(self) -> dict[str, Any]:
+        """Nothing beyond what every flight records."""
+        return {}
+
+    def reset(self, world: World, scene: Scene, limits: Limits) -> None:
         """Begin a trial in `world`."""
         extent_m = world.flight_bounds_m[1] - world.flight_bounds_m[0]
         self._time_limit_s = self.time_base_s + self.time_per_area_spm2 * float(extent_m[0] * extent_m[1])
@@ -38,7 +55,7 @@ class Explore:
         """Base time plus a time for each square metre of floor."""
         return self._time_limit_s
 
-    def outcome(self, true_position_m: Float, observation: Observation) -> Outcome | None:
+    def outcome(self, true_state: State, observation: Observation) -> Outcome | None:
         """EXPLORED when no frontier has been reachable for `patience_s`."""
         if observation.best_goal is not None:
             self._last_goal_s = observation.time_s

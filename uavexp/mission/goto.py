@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from uavexp.errors import require_non_negative, require_positive
-from uavexp.types import Float, Observation, Outcome, World
+from uavexp.explorer.base import Explorer
+from uavexp.scene import Scene
+from uavexp.types import Float, Limits, Observation, Outcome, State, World
 
 
 @dataclass(slots=True, kw_only=True)
@@ -23,7 +26,19 @@ class Goto:
         require_positive(tolerance_m=self.tolerance_m, time_base_s=self.time_base_s)
         require_non_negative(time_per_path_spm=self.time_per_path_spm)
 
-    def reset(self, world: World) -> None:
+    def prepare(self, world: World, rng: np.random.Generator) -> World:
+        """The world as it is."""
+        return world
+
+    def guide(self, explorer: Explorer) -> Explorer:
+        """The explorer."""
+        return explorer
+
+    def findings(self) -> dict[str, Any]:
+        """Nothing beyond what every flight records."""
+        return {}
+
+    def reset(self, world: World, scene: Scene, limits: Limits) -> None:
         """Begin a trial in `world`."""
         self._world = world
 
@@ -37,9 +52,9 @@ class Goto:
         """Base time plus a time for each metre of the true shortest path."""
         return self.time_base_s + self.time_per_path_spm * self._task().difficulty.shortest_path_m
 
-    def outcome(self, true_position_m: Float, observation: Observation) -> Outcome | None:
+    def outcome(self, true_state: State, observation: Observation) -> Outcome | None:
         """REACHED within the tolerance of the target."""
-        distance_m = np.linalg.norm(true_position_m - self._task().target_m)
+        distance_m = np.linalg.norm(true_state.position_m - self._task().target_m)
         return Outcome.REACHED if distance_m <= self.tolerance_m else None
 
     def _task(self) -> World:
