@@ -25,6 +25,7 @@ from uavexp.types import DepthScan, Float, State, World
 from uavexp.world.warehouse import Warehouse
 
 SPEED_MPS = 1.2
+NOTHING = Scene.from_mesh(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32))
 
 
 def milliseconds(seconds: list[float]) -> dict[str, float]:
@@ -57,7 +58,7 @@ def measure(
         esdf_speedup_over_scipy (scipy's time over the median update), changed_voxels_median.
     """
     for timed in (False, True):  # the first round compiles
-        backend.reset(bounds_m)
+        backend.reset(bounds_m, NOTHING)
         backend.mark_free(scans[0].camera_position_m, 0.6)
         integrate, update, plane, changed = [], [], [], []
         for n, scan in enumerate(scans if timed else scans[:20]):

@@ -18,8 +18,12 @@ def options(group: str) -> list[str]:
 
 
 def build(group: str, option: str, **changes: Any) -> Any:
-    """The component that an option's yaml describes."""
+    """The component that an option's yaml describes, with the options of its group that it holds."""
     values = OmegaConf.to_container(OmegaConf.load(CONF / group / f"{option}.yaml"))
+    for inner in values.pop("defaults", []):  # risk@policies.risk
+        part, _, place = inner.partition("@")
+        parameter, name = place.split(".")
+        values[parameter][name] = build(group, part)
     return get_class(values.pop("_target_"))(**(values | changes))
 
 
@@ -28,14 +32,19 @@ def check_yaml(group: str, option: str) -> None:
     path = CONF / group / f"{option}.yaml"
     values = dict(OmegaConf.to_container(OmegaConf.load(path)))
     target = values.pop("_target_")
+    values.pop("defaults", None)
     assert target.rpartition(".")[0] == f"uavexp.{group}.{option}"
     fields = {field.name: field for field in dataclasses.fields(get_class(target)) if field.init}
     assert values.keys() == fields.keys()
     for name, value in values.items():
         default = fields[name].default
+        if default is dataclasses.MISSING:
+            continue
         assert (tuple(value) if isinstance(value, list) else value) == default, name
     lines = [
-        line for line in path.read_text().splitlines() if line and not line.startswith(("_target_", "#"))
+        line
+        for line in path.read_text().splitlines()
+        if line and not line.startswith(("_target_", "#", "defaults:", "  - "))
     ]
     assert all("#" in line for line in lines)
 

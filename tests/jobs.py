@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from uavexp.sweep.job import Report
+from uavexp.sweep.job import Progress
 
 
-def act(payload: tuple[str, Any], report: Report) -> Any:
+def act(payload: tuple[str, Any], report: Progress) -> Any:
     """Do what the payload says and return its argument's double, if it is a number."""
     deed, argument = payload
     report(0.0, "begun")

@@ -1,10 +1,10 @@
-"""Depth images of box worlds by the slab method: an oracle independent of the package's renderer."""
+"""Scans of box worlds by the slab method: an oracle independent of the package's renderer."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from uavexp.types import DepthScan, Float
+from uavexp.types import DepthScan, Float, RayScan
 
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]  # lower and upper corner, m
 
@@ -55,4 +55,43 @@ def take_scan(
         max_range_m=max_range_m,
         camera_position_m=position,
         camera_rotation=rotation,
+    )
+
+
+def ring_directions(rings: int = 64, azimuths: int = 720) -> Float:
+    """Unit directions (N, 3) all around, elevations from -80 to 80 degrees."""
+    elevation, azimuth = np.meshgrid(
+        np.radians(np.linspace(-80.0, 80.0, rings)), 2.0 * np.pi * np.arange(azimuths) / azimuths
+    )
+    level = np.cos(elevation)
+    grid = np.stack([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)], axis=-1)
+    return grid.reshape(-1, 3)
+
+
+def take_ray_scan(
+    boxes: list[Box],
+    position_m: tuple[float, float, float],
+    direction: Float,
+    *,
+    max_range_m: float = 12.0,
+    noise: np.random.Generator | None = None,
+) -> RayScan:
+    """Ranges to solid boxes along unit directions (N, 3), seen from outside, with 2 cm of noise if asked."""
+    position = np.asarray(position_m, dtype=np.float64)
+    range_m = np.full(len(direction), np.inf)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for low, high in boxes:
+            first, second = (low - position) / direction, (high - position) / direction
+            enter = np.minimum(first, second).max(axis=-1)
+            leave = np.maximum(first, second).min(axis=-1)
+            hit = (enter <= leave) & (enter > 0.0) & (enter < range_m)
+            range_m = np.where(hit, enter, range_m)
+    if noise is not None:
+        range_m = range_m + 0.02 * noise.normal(size=range_m.shape)
+    return RayScan(
+        time_s=0.0,
+        origin_m=position,
+        direction=direction.astype(np.float32),
+        range_m=np.where(range_m > max_range_m, np.inf, range_m).astype(np.float32),
+        max_range_m=max_range_m,
     )

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
-from uavexp.errors import ConfigError, UavexpError
+from uavexp.errors import ConfigError, UavexpError, one_line
 
 
 class _Parser(argparse.ArgumentParser):
@@ -18,7 +18,10 @@ class _Parser(argparse.ArgumentParser):
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command line and return its exit code: 0, 1 a trial raised, 2 bad input, 130 interrupted."""
+    """Run one command line and return its exit code.
+
+    0; 1 a trial did not run to its end or the disk was full; 2 bad input; 130 interrupted.
+    """
     os.environ["MPLBACKEND"] = "Agg"
     # a job started with & ignores SIGINT, and SIGTERM would lose the table of what has flown
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -26,8 +29,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         return _run(sys.argv[1:] if arguments is None else arguments)
     except UavexpError as error:
-        sys.stderr.write(f"error: {' '.join(str(error).split())}\n")
-        return 2
+        sys.stderr.write(f"error: {one_line(error)}\n")
+        return error.exit_code
     except KeyboardInterrupt:
         sys.stderr.write("interrupted\n")
         return 130

@@ -1,13 +1,21 @@
 """Errors a user can mend: one line each, never a traceback."""
 
+import errno
 from enum import StrEnum
 from typing import TypeVar
 
 Option = TypeVar("Option", bound=StrEnum)
+_DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 class UavexpError(Exception):
-    """Base of every error that the user can mend; printed as one line, exit code 2."""
+    """Base of every error that the user can mend; printed as one line (`one_line`)."""
+
+    @property
+    def exit_code(self) -> int:
+        """2, bad input; 1 when the disk was full, which is no fault of what was typed."""
+        cause = self.__cause__
+        return 1 if isinstance(cause, OSError) and cause.errno in _DISK_FULL else 2
 
 
 class ConfigError(UavexpError, ValueError):
@@ -20,6 +28,11 @@ class WorldError(UavexpError):
 
 class RecordError(UavexpError):
     """A stored record is damaged, of another version, or cannot be written."""
+
+
+def one_line(error: BaseException) -> str:
+    """The message of an error without line breaks."""
+    return " ".join(str(error).split())
 
 
 def require(condition: bool, message: str) -> None:

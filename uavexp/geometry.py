@@ -125,6 +125,37 @@ def evaluate(trajectory: Trajectory, times_s: Float) -> tuple[Float, Float, Floa
     return p, v, a
 
 
+@nb.njit(cache=True)
+def differentiate_pieces(breaks_s: Float, coefficients: Float, times_s: Float, order: int) -> Float:
+    """The `order`-th derivative (N, 3) of a `Trajectory`'s arrays at times (N,).
+
+    Outside, as in `evaluate_pieces`: the ends, at rest.
+    """
+    pieces, terms, _ = coefficients.shape
+    out = np.zeros((times_s.shape[0], 3))
+    for n in range(times_s.shape[0]):
+        t = times_s[n]
+        clamped = min(max(t, breaks_s[0]), breaks_s[pieces])
+        if order > 0 and t != clamped:
+            continue
+        k = min(max(np.searchsorted(breaks_s, clamped, side="right") - 1, 0), pieces - 1)
+        s = clamped - breaks_s[k]
+        for j in range(terms - 1, order - 1, -1):  # Horner on coefficients times j! / (j - order)!
+            factor = 1.0
+            for i in range(order):
+                factor *= j - i
+            for axis in range(3):
+                out[n, axis] = out[n, axis] * s + factor * coefficients[k, j, axis]
+    return out
+
+
+def derivative(trajectory: Trajectory, times_s: Float, order: int) -> Float:
+    """Derivative of the position (N, 3), m/s^order, at absolute times (N,): 3 is jerk, 4 is snap."""
+    pieces = (trajectory.breaks_s, trajectory.coefficients)
+    value: Float = differentiate_pieces(*pieces, np.atleast_1d(times_s), order)
+    return value
+
+
 def sample_times(trajectory: Trajectory, from_s: float, step_s: float) -> Float:
     """Times from max(from_s, start) to the end, `step_s` apart, the end included."""
     begin = min(max(from_s, trajectory.start_s), trajectory.end_s)

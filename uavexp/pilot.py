@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from uavexp.explorer.base import Explorer
-from uavexp.geometry import evaluate, sample_times, wrap_angle
+from uavexp.geometry import derivative, evaluate, sample_times, wrap_angle
 from uavexp.planner.base import Planner
 from uavexp.planner.brake import braking_trajectory, hover_before, with_stop
 from uavexp.recorder import Stopwatch
@@ -108,6 +108,7 @@ class Pilot:
             acceleration_mps2=acceleration[0],
             yaw_rad=self.yaw_rad,
             yaw_rate_radps=rate_radps,
+            jerk_mps3=derivative(self.trajectory, np.array([time_s]), 3)[0],
         )
 
     def _hold(self, position_m: Float, yaw_rate_radps: float = 0.0) -> Reference:

@@ -1,7 +1,8 @@
 """Questions to the true geometry: rays, distances, and whether a box touches it.
 
-Rays and distances come from Open3D's RaycastingScene on one thread (Embree, float32);
-touching is exact in float64 (`triangle_grid`).
+Rays and distances to fixed surfaces come from Open3D's RaycastingScene on one thread (Embree,
+float32); movers are met in closed form (`bodies`), and touching is exact in float64
+(`triangle_grid`, `bodies`). Without movers nothing is added to any answer.
 """
 
 from __future__ import annotations
@@ -11,9 +12,9 @@ from typing import cast
 import numpy as np
 
 from uavexp import triangle_grid
-from uavexp.bodies import distance_m
+from uavexp.bodies import cast_rays, distance_m, touching
 from uavexp.o3d import open3d
-from uavexp.types import Bodies, Float, Float32, Int32, World
+from uavexp.types import Bodies, Float, Float32, Int, Int32, World
 
 _THREADS = 1  # records must not depend on the machine
 
@@ -54,15 +55,22 @@ class Scene:
         self.bodies = bodies
 
     def cast(self, rays: Float32) -> tuple[Float32, Float32]:
-        """Intersect rays with the nearest surface.
+        """Intersect rays with the nearest surface, fixed or a mover's.
 
         Args:
             rays: origin and direction (N, 6), m; directions of any length > 0.
 
         Returns:
             Ray parameter (N,) in units of the direction, inf on a miss; unit normal of the
-            triangle hit (N, 3), either side, 0 on a miss.
+            triangle hit (N, 3), either side, or of the mover hit, outward; 0 on a miss.
         """
+        hit, normal = self.fixed_cast(rays)
+        if len(self.bodies):
+            cast_rays(self.bodies, rays, hit, normal)
+        return hit, normal
+
+    def fixed_cast(self, rays: Float32) -> tuple[Float32, Float32]:
+        """The same with fixed surfaces alone."""
         if self._raycasting is None:
             count = rays.shape[0]
             return np.full(count, np.inf, dtype=np.float32), np.zeros((count, 3), dtype=np.float32)
@@ -81,15 +89,17 @@ class Scene:
         distance = self._raycasting.compute_distance(_tensor(points_m), nthreads=_THREADS)
         return cast(Float, distance.numpy().astype(np.float64))
 
-    def closest_point_m(self, points_m: Float) -> Float:
-        """Nearest surface point (N, 3) of points (N, 3), m; inf in empty space."""
+    def fixed_closest_point_m(self, points_m: Float) -> Float:
+        """Nearest point (N, 3) on a fixed surface of points (N, 3), m; inf in empty space."""
         if self._raycasting is None:
             return np.full((points_m.shape[0], 3), np.inf)
         closest = self._raycasting.compute_closest_points(_tensor(points_m), nthreads=_THREADS)
         return cast(Float, closest["points"].numpy().astype(np.float64))
 
     def touches(self, position_m: Float, rotation: Float, size_m: Float, margin_m: float = 0.0) -> bool:
-        """Whether an oriented box meets a surface, exactly (a box wholly inside a solid does not).
+        """Whether an oriented box meets a surface or a mover, exactly.
+
+        A box wholly inside a fixed solid meets no surface; one inside a mover does meet it.
 
         Args:
             position_m: centre of the box (3,).
@@ -97,10 +107,21 @@ class Scene:
             size_m: length, width, height (3,).
             margin_m: added on every side, >= 0.
         """
+        if self.touches_fixed(position_m, rotation, size_m, margin_m):
+            return True
+        return len(self.bodies) > 0 and len(self.touched_movers(position_m, rotation, size_m, margin_m)) > 0
+
+    def touches_fixed(self, position_m: Float, rotation: Float, size_m: Float, margin_m: float = 0.0) -> bool:
+        """The same with fixed surfaces alone."""
         if self._raycasting is None:
             return False
         half = 0.5 * np.asarray(size_m, dtype=np.float64) + margin_m
         return bool(triangle_grid.box_meets_mesh(self.grid, position_m, rotation, half))
+
+    def touched_movers(self, position_m: Float, rotation: Float, size_m: Float, margin_m: float = 0.0) -> Int:
+        """Which movers (K,) the box meets, ascending."""
+        half = 0.5 * np.asarray(size_m, dtype=np.float64) + margin_m
+        return touching(self.bodies, position_m, rotation, half)
 
     @property
     def grid(self) -> triangle_grid.TriangleGrid:

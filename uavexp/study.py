@@ -135,6 +135,8 @@ def study_text(study: Study) -> str:
 def collect(folder: Path) -> list[Row]:
     """Write both tables of a study folder anew, from its records alone.
 
+    Delays that a record does not tell (an earlier version wrote it) come from its log, if that is there.
+
     Returns:
         The rows of `trials.parquet`.
 
@@ -149,6 +151,7 @@ def collect(folder: Path) -> list[Row]:
         if cell_digest(record) not in place or trial_name(record) != item.name:
             raise RecordError(f"{item} is no trial of this study: move it away")
         index, labels = place[cell_digest(record)]
+        record = _with_delays(record, item / LOG)
         row = row_of(record, read_wall(item), labels)
         trials.append((index, record["seed"], row, list(replan_rows(record, labels))))
     trials.sort(key=lambda trial: trial[:2])
@@ -156,6 +159,18 @@ def collect(folder: Path) -> list[Row]:
     write_table(folder / TABLE, rows)
     write_table(folder / REPLANS, [row for *_, replans in trials for row in replans], FIRST_OF_REPLANS)
     return rows
+
+
+def _with_delays(record: dict[str, Any], log: Path) -> dict[str, Any]:
+    """A record whose planning requests tell their delays, as far as they are known."""
+    replans = record.get("replans", [])
+    if not replans or "delay_s" in replans[0] or not log.is_file():
+        return record
+    from uavexp.metrics.replanning import request_delays  # with a whole world of geometry behind it
+
+    delays = request_delays(read_log(log))
+    told = [{**replan, **delay._asdict()} for replan, delay in zip(replans, delays, strict=True)]
+    return {**record, "replans": told}
 
 
 def trial_folders(folder: Path) -> Iterator[Path]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import math
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,10 +26,23 @@ FIRST = (
     "replans",
     "tracking_error_m",
 )
-FIRST_OF_REPLANS = ("trial", "strategy", "world", "seed", "number", "time_s", "effective_s", "cause", "score")
+FIRST_OF_REPLANS = (
+    "trial",
+    "strategy",
+    "world",
+    "seed",
+    "number",
+    "time_s",
+    "effective_s",
+    "cause",
+    "score",
+    "blocked_since_s",
+    "delay_s",
+)
 ERROR = "error"  # outcome of a trial that did not run to an end
 _WORLD_NUMBERS = ("clutter_density", "narrowest_gap_m", "straight_line_m")
 _LAP_KINDS = ("sum_s", "median_s", "p99_s")
+_NO_DELAY = {"blocked_since_s": math.nan, "delay_s": math.nan}  # of a record that does not tell
 _TARGET = "_target_"
 
 Row = dict[str, Any]
@@ -58,13 +73,36 @@ def row_of(record: Record, wall: Mapping[str, Any], labels: Mapping[str, str]) -
         "trial": trial_name(record),
         "world_digest": world.get("digest"),
         "code": record["code"][:12],
+        "lock": (record.get("lock") or "")[:12],
         **_parameters(record["config"]),
         **_clock(wall),
     }
 
 
+def pooled_versions(versions: Iterable[tuple[str, ...]]) -> str:
+    """A sentence about trials of several versions in one table; empty for one version.
+
+    Args:
+        versions: of each trial: the columns `code` and `lock`.
+    """
+    counts = Counter(versions)
+    if len(counts) < 2:
+        return ""
+    trials = ", ".join(
+        f"{count} of {' with '.join(filter(None, version)) or 'an unknown one'}"
+        for version, count in sorted(counts.items(), key=lambda item: (-item[1], item[0]))
+    )
+    return (
+        f"Trials of {len(counts)} versions of the code or its packages are pooled here "
+        f"(runner.accept_other_code): {trials}."
+    )
+
+
 def replan_rows(record: Record, labels: Mapping[str, str]) -> Iterator[Row]:
     """A trial's planning requests as rows of `replans.parquet`; number 0 is the first plan.
+
+    `blocked_since_s` and `delay_s` are NaN where the flown trajectory was not blocked when the
+    plan was asked for (`metrics.replanning.request_delays`).
 
     Args:
         record: of `read_record`.
@@ -81,7 +119,7 @@ def replan_rows(record: Record, labels: Mapping[str, str]) -> Iterator[Row]:
         numbers = {name: restore(value) for name, value in replan.items() if not isinstance(value, list)}
         position = dict(zip(("x_m", "y_m", "z_m"), replan["position_m"], strict=True))
         goal = dict(zip(("goal_x_m", "goal_y_m", "goal_z_m"), replan["goal_m"], strict=True))
-        yield {**whose, "number": number, **position, **goal, **numbers}
+        yield {**whose, "number": number, **position, **goal, **_NO_DELAY, **numbers}
 
 
 def columns_of(rows: Sequence[Row], first: Sequence[str] = FIRST) -> list[str]:

@@ -135,10 +135,11 @@ def fly(parts: Parts, world: World, seed: int, progress: Progress | None = None)
     outcome: Outcome | None = None
     tracks = Tracks.none()
 
+    bodies = parts.movers.at(0.0)
+    scene.place(bodies)
+
     for step in range(last_step + 1):
         time_s = step * parts.step_s
-        bodies = parts.movers.at(time_s)
-        scene.place(bodies)
         if step % period["sensor.rate_hz"] == 0:
             with watch.lap("sense"):
                 scan = parts.sensor.capture(state, estimate, time_s)
@@ -170,6 +171,8 @@ def fly(parts: Parts, world: World, seed: int, progress: Progress | None = None)
             break
         with watch.lap("vehicle"):
             moved = parts.vehicle.step(command, parts.step_s)
+            bodies = parts.movers.at(time_s + parts.step_s)
+            scene.place(bodies)
             state, touched = contact.advance(state, moved, time_s + parts.step_s)
             if touched:
                 parts.vehicle.place(state)

@@ -15,8 +15,8 @@ from uavexp.paths import PACKAGE
 LAYERS = (
     {"errors"},
     {"types", "kernel_cache", "__init__"},
-    {"seeding", "geometry", "o3d", "triangle_grid", "bodies", "scene", "paths"},
-    {"roles", "metrics"},
+    {"seeding", "geometry", "flatness", "o3d", "triangle_grid", "bodies", "scene", "paths"},
+    {"roles", "metrics", "inspection"},
     {"recorder", "pilot", "trial", "parameters", "trust", "records", "logs", "table", "worlds", "study"},
     {"sweep", "report"},
     {"build"},

@@ -13,8 +13,10 @@ from tests.exact_distance import exact_field
 from tests.scans import Box, take_scan
 from uavexp.errors import ConfigError, WorldError
 from uavexp.mapping.base import FREE, OCCUPIED, UNKNOWN, MapBackend
+from uavexp.mapping.parameters import MapParameters
+from uavexp.scene import Scene
 
-OPTIONS = sorted((Path(__file__).parents[2] / "conf" / "mapping").glob("*.yaml"))
+EVERY = sorted((Path(__file__).parents[2] / "conf" / "mapping").glob("*.yaml"))
 BOUNDS_M = np.array([[0.0, 0.0, 0.0], [8.0, 6.0, 3.0]])
 CAMERA_M = (0.55, 3.05, 1.45)
 WALL_M = 3.0  # x of the near face
@@ -27,15 +29,26 @@ ROOM: list[Box] = [
 ]
 
 
+NOTHING = Scene.from_mesh(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32))
+
+
+def class_of(path: Path) -> type:
+    module, name = str(OmegaConf.load(path)["_target_"]).rsplit(".", 1)
+    return getattr(importlib.import_module(module), name)
+
+
+OPTIONS = [path for path in EVERY if issubclass(class_of(path), MapParameters)]  # those that fuse scans
+
+
 def build(path: Path, **changes: object) -> MapBackend:
     parameters = dict(OmegaConf.to_container(OmegaConf.load(path))) | changes
-    module, name = str(parameters.pop("_target_")).rsplit(".", 1)
-    return getattr(importlib.import_module(module), name)(**parameters)
+    parameters.pop("_target_")
+    return class_of(path)(**parameters)
 
 
 def begin(path: Path, **changes: object) -> MapBackend:
     backend = build(path, **changes)
-    backend.reset(BOUNDS_M)
+    backend.reset(BOUNDS_M, NOTHING)
     return backend
 
 
@@ -67,6 +80,7 @@ def test_there_are_options():
     assert {"dense", "voxel_block_grid"} <= {path.stem for path in OPTIONS}
 
 
+@pytest.mark.parametrize("option", EVERY, ids=lambda path: path.stem)
 def test_yaml_gives_every_parameter_with_its_default(option):
     given = OmegaConf.load(option)
     module, name = given["_target_"].rsplit(".", 1)
@@ -101,12 +115,13 @@ def test_bad_parameters_are_refused_by_name(option, wrong):
         build(option, **wrong)
 
 
+@pytest.mark.parametrize("option", EVERY, ids=lambda path: path.stem)
 def test_absurd_maps_are_refused_with_the_memory_they_need(option):
     backend = build(option)
     with pytest.raises(WorldError, match=r"needs [\d,]+ MB"):
-        backend.reset(np.array([[0.0, 0.0, 0.0], [1000.0, 1000.0, 50.0]]))
+        backend.reset(np.array([[0.0, 0.0, 0.0], [1000.0, 1000.0, 50.0]]), NOTHING)
     with pytest.raises(WorldError, match="bounds_m"):
-        backend.reset(np.array([[0.0, 0.0, 0.0], [1.0, -1.0, 1.0]]))
+        backend.reset(np.array([[0.0, 0.0, 0.0], [1.0, -1.0, 1.0]]), NOTHING)
 
 
 def test_new_map_is_unknown_at_the_truncation(option):
@@ -320,7 +335,7 @@ def test_same_scans_give_the_same_bytes_also_after_a_reset(option):
             for update in fly_past(backend, ROOM, noise=np.random.default_rng(4))
         ]
         runs.append((logs, backend.field.distance.tobytes(), backend.field.state.tobytes()))
-        backend.reset(BOUNDS_M)
+        backend.reset(BOUNDS_M, NOTHING)
     assert runs[0] == runs[1]
 
 
@@ -359,4 +374,4 @@ def test_missing_gpu_is_named_with_the_package_that_brings_it():
         VoxelBlockGrid(device="GPU")
     absent = VoxelBlockGrid(device="CUDA:99")  # cheap to construct: only reset looks for the device
     with pytest.raises(ConfigError, match="open3d in place of open3d-cpu"):
-        absent.reset(BOUNDS_M)
+        absent.reset(BOUNDS_M, NOTHING)

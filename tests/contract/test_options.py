@@ -41,6 +41,7 @@ SHARED = yaml.safe_load((CONF / "config.yaml").read_text())  # keys that options
 
 def load(group: str, option: str) -> dict[str, object]:
     tree = dict(yaml.safe_load((CONF / group / f"{option}.yaml").read_text()))
+    tree.pop("defaults", None)  # options of its group that it holds
     references = {key: re.fullmatch(r"\$\{(\w+)\}", str(value)) for key, value in tree.items()}
     return {key: SHARED[match[1]] if (match := references[key]) else tree[key] for key in tree}
 
@@ -149,13 +150,16 @@ def test_a_preset_only_overrides(preset: str) -> None:
     tree = yaml.safe_load(text)
     groups = [key.removeprefix("override /") for item in tree.pop("defaults") for key in item]
     assert set(groups) <= set(GROUPS)
-    assert all(set(values(part)) == set(part) for part in tree.values()), "a preset names no class"
+    parts = [part for part in tree.values() if isinstance(part, dict)]
+    assert all(set(values(part)) == set(part) for part in parts), "a preset names no class"
     cell = COMPOSER.cell(parse_settings([f"{PRESET_GROUP}={preset}"]))
     assert cell.strategy == preset
 
 
 def test_presets_differ_in_the_trigger_and_in_the_goal_of_a_single_shot_only() -> None:
-    cells = [COMPOSER.cell(parse_settings([f"{PRESET_GROUP}={preset}"])) for preset in PRESETS]
+    """Those of the other papers are apart: movers with another sensor, another planner."""
+    alike = [preset for preset in PRESETS if preset not in ("risk", "bspline_mpc")]
+    cells = [COMPOSER.cell(parse_settings([f"{PRESET_GROUP}={preset}"])) for preset in alike]
     shared = [
         {
             key: value

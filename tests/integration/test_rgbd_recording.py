@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import distance_transform_edt
 
-from tests.contract.test_mapping_contract import OPTIONS, build
+from tests.contract.test_mapping_contract import NOTHING, OPTIONS, build
 from uavexp.mapping.base import FREE, OCCUPIED, UNKNOWN, MapBackend
 from uavexp.types import DepthScan, Float
 
@@ -63,7 +63,7 @@ def maps(scans) -> dict[str, MapBackend]:
     for path in OPTIONS:
         backend = build(path, voxel_size_m=0.05, truncation_m=0.15, occupied_below_m=0.0125,
                         free_above_m=0.05, solid_depth_m=0.125, max_distance_m=1.0)  # fmt: skip
-        backend.reset(BOUNDS_M)
+        backend.reset(BOUNDS_M, NOTHING)
         for n, scan in enumerate(scans[0]):
             backend.integrate(scan)
             if n % 2 == 1:

@@ -17,9 +17,10 @@ import pytest
 
 from tests.sweeps import QUICK, assert_same_study, begin, records, run
 from uavexp.__main__ import main
+from uavexp.cli.history import commit
 from uavexp.paths import PACKAGE
 from uavexp.records import canonical_json, digest, read_record, seal
-from uavexp.study import collect, read_study
+from uavexp.study import collect, read_runs, read_study
 
 STUDY = (*QUICK, "strategy=mcr,tbr", "seed=0:3")
 FAULTY = ("--config-dir", str(PACKAGE.parent / "tests" / "faulty"))
@@ -126,7 +127,49 @@ def test_trials_of_another_version_are_not_pooled_unasked(
     assert records(copy) == before
     if key == "code":
         assert main([*STUDY, f"out={copy}", "runner.accept_other_code=true"]) == 0
+        assert "Trials of 2 versions" in capsys.readouterr().out
         assert set(pd.read_parquet(copy / "trials.parquet")["code"].str.startswith("000000")) == {True, False}
+
+
+def test_a_world_that_is_cut_or_gone_is_mended_when_a_trial_in_it_flies_again(
+    copy: Path, undisturbed: Path
+) -> None:
+    cut, gone, _ = sorted((copy / "worlds").iterdir())
+    cut.write_bytes(cut.read_bytes()[:1000])
+    gone.unlink()
+    for row in read_study(copy).trials.to_dict("records"):
+        if row["world_digest"] in (cut.stem, gone.stem) and row["strategy"] == "tbr":
+            shutil.rmtree(copy / "trials" / row["trial"])
+    assert main([*STUDY, f"out={copy}"]) == 0
+    assert_same_study(copy, undisturbed)
+
+
+def test_parts_of_one_experiment_join_in_any_order(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Used to be refused unless one command had all cells of the other."""
+    file = tmp_path / "own" / "experiments" / "mine" / "parts.yaml"
+    file.parent.mkdir(parents=True)
+    file.write_text("axes: {arm: {MCR: {strategy: mcr}, TBR: {strategy: tbr}, SSP: {strategy: ssp}}}")
+    given = ("--config-dir", str(tmp_path / "own"), *QUICK, "experiments=mine/parts", "seed=0")
+    assert main([*given, "arm=MCR,TBR", f"out={tmp_path / 'whole'}"]) == 0
+    for arm in ("TBR", "MCR"):
+        assert main([*given, f"arm={arm}", f"out={tmp_path / 'parts'}"]) == 0
+    assert_same_study(tmp_path / "parts", tmp_path / "whole")
+    capsys.readouterr()
+    assert main([*given, "arm=SSP", "latency_s=0.05", f"out={tmp_path / 'parts'}"]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert "out=DIR" in error
+    assert "experiments=mine/parts seed=0 arm=MCR)" in error  # the earlier command, as typed
+
+
+def test_one_trial_keeps_the_limits_of_all_trials(tmp_path: Path) -> None:
+    """Used to be flown in the command's own process, without any."""
+    done = run(*QUICK, "seed=0", "runner.timeout_s=0.01", f"out={tmp_path / 'study'}")
+    assert done.returncode == 1, done.stderr
+    (row,) = read_study(tmp_path / "study").trials.to_dict("records")
+    assert row["status"] == "hung"
 
 
 def test_trials_of_another_schema_are_refused_with_what_to_do(
@@ -208,6 +251,11 @@ def test_an_interrupted_sweep_says_how_to_go_on(tmp_path: Path) -> None:
     assert error == "interrupted\n"
     assert f"of 6 trials are kept in {folder}; the same command flies the others" in out
     assert len(pd.read_parquet(folder / "trials.parquet")) == len(records(folder)) >= 2
+    (entry,) = read_runs(folder)
+    assert (entry["ended"], entry["flown"]) == ("interrupted", len(records(folder)))
+    assert main([*STUDY, f"out={folder}"]) == 0
+    assert [entry["ended"] for entry in read_runs(folder)] == ["interrupted", "finished"]
+    assert {entry["commit"] for entry in read_runs(folder)} == {commit()}
 
 
 @contextlib.contextmanager
@@ -230,7 +278,7 @@ def test_a_full_disk_ends_the_sweep_with_one_line_and_loses_nothing(
     disk = tmp_path / "disk"
     with small_disk(disk, "700k"):
         done = run(*STUDY, "runner.n_jobs=2", f"out={disk / 'study'}")
-        assert done.returncode == 2
+        assert done.returncode == 1, "what was typed was right"
         assert done.stderr.count("\n") == 1
         assert "No space left on device" in done.stderr
         kept = records(disk / "study")

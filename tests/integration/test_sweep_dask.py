@@ -16,7 +16,7 @@ from tests.jobs import act
 from tests.sweeps import QUICK, assert_same_study, run
 from uavexp.__main__ import main
 from uavexp.errors import ConfigError
-from uavexp.sweep.dask import run_dask, slurm_cluster
+from uavexp.sweep.dask import differing_packages, run_dask, slurm_cluster
 from uavexp.sweep.job import Done, Job, Limits, Status
 
 distributed = pytest.importorskip("distributed", reason="Dask is an extra: pip install 'uavexp[dask]'")
@@ -93,6 +93,37 @@ def test_no_scheduler_is_one_clear_error() -> None:
         pytest.raises(ConfigError, match="no Dask scheduler answers"),
     ):
         next(start(jobs(("nothing", 1.0)), "tcp://127.0.0.1:1"))
+
+
+def test_workers_of_another_version_are_refused_before_anything_is_submitted(
+    cluster: Any, tmp_path: Path
+) -> None:
+    given = jobs(("note_and_sleep", tmp_path))
+    address = cluster.scheduler_address
+    results = run_dask(
+        act, given, address=address, queue=None, n_jobs=2, limits=LIMITS, version=os.getpid
+    )  # every process has its own
+    with pytest.raises(ConfigError, match="2 of 2 Dask workers run another version of uavexp"):
+        next(results)
+    assert not list(tmp_path.iterdir())
+
+
+def test_packages_that_differ_are_named_with_both_versions() -> None:
+    packages = {"python": "3.11.7", "numpy": "2.0", "lz4": None}
+    other = {"packages": {**packages, "numpy": "1.26"}}
+    versions = {
+        "client": {"packages": packages},
+        "scheduler": {"packages": packages},
+        "workers": {"a": other},
+    }
+    assert differing_packages(versions) == ["numpy 1.26 there, 2.0 here"]
+    assert differing_packages({**versions, "workers": {}}) == []
+
+
+def test_a_cluster_and_a_queue_are_one_too_many(capsys: pytest.CaptureFixture[str]) -> None:
+    both = ("runner.address=tcp://127.0.0.1:1", "runner.queue=slurm", "runner.n_jobs=2")
+    assert main([*STUDY, "runner=dask", *both]) == 2
+    assert "not both" in capsys.readouterr().err
 
 
 def test_slurm_is_asked_for_one_worker_a_job_with_room_for_a_trial() -> None:

@@ -68,7 +68,7 @@ def test_only_the_velocity_into_the_plane_is_lost(normal, q, turned_by, directio
     state, touched = resolve(before, after, scene, SIZE_M)
     left = float(normal @ after.position_m) - after_reach
     if abs(left) > 1e-5:
-        assert touched == (left < 0.0)
+        assert bool(touched) == (left < 0.0)
     if not touched:
         assert state is after
         return

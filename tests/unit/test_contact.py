@@ -12,7 +12,7 @@ from tests.logs import make_world
 from uavexp.controller.position_velocity import PositionVelocity
 from uavexp.geometry import multiply_quaternions, quaternion_from_yaw, rotation_from_quaternion
 from uavexp.scene import Scene
-from uavexp.types import Reference, State
+from uavexp.types import Bodies, Reference, State
 from uavexp.vehicle.contact import ContactTracker, resolve
 from uavexp.vehicle.quadrotor import Quadrotor
 
@@ -76,7 +76,7 @@ def fly(state, scene, steps, acceleration=STILL):
         state, touch = resolve(state, drifted(state, acceleration), scene, SIZE_M)
         assert not overlaps(state, scene)
         states.append(state)
-        touched += touch
+        touched += bool(touch)
     return states, touched
 
 
@@ -228,11 +228,11 @@ def test_a_contact_counts_once_until_the_gap_has_been_wide_for_long():
 
 def test_far_from_everything_a_step_asks_the_scene_nothing():
     class Counting:
-        asked = 0
+        asked, bodies = 0, Bodies.none()
 
-        def distance_m(self, points_m):
+        def fixed_distance_m(self, points_m):
             self.asked += 1
-            return WALL.distance_m(points_m)
+            return WALL.fixed_distance_m(points_m)
 
     scene = Counting()
     tracker = ContactTracker(scene=scene, body_size_m=SIZE_M)

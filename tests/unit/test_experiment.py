@@ -151,6 +151,19 @@ def test_an_axis_may_not_hide_a_key(tmp_path: Path) -> None:
         Composer(user_folder=tmp_path).command(parse_settings(["experiments=own/bad"]))
 
 
+def test_the_levels_that_the_robustness_report_judges_are_flown() -> None:
+    experiment = read_experiment("mcr/noise_latency_drift", SHIPPED["mcr/noise_latency_drift"])
+    settings, axes = experiment.settings, experiment.axes
+    for name, axis in {
+        "small_noise": "noise",
+        "moderate_latency": "latency",
+        "severe_drift": "drift",
+    }.items():
+        assert settings[name] in axes[axis]
+        assert settings["none"][axis] in axes[axis]
+        assert settings[name] != settings["none"][axis]
+
+
 @pytest.mark.parametrize("name", sorted(SHIPPED))
 def test_every_shipped_experiment_has_cells_and_paired_arms(name: str) -> None:
     labelled, axes = expand(read_experiment(name, SHIPPED[name]), [])

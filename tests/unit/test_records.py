@@ -14,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pyarrow import parquet
 
+from tests.logs import make_log, make_replan, still_curve
 from uavexp.errors import RecordError
 from uavexp.logs import arrays_digest, log_arrays, read_log, write_log
 from uavexp.records import (
@@ -27,6 +28,7 @@ from uavexp.records import (
     write_atomically,
     write_text,
 )
+from uavexp.study import Study, StudyCell, collect, read_study, study_text
 from uavexp.table import FIRST, replan_rows, row_of, write_table
 from uavexp.types import Contact, Outcome, PlanStatus, Replan, TrialLog, World
 from uavexp.world.random_columns import RandomColumns
@@ -299,6 +301,35 @@ def test_every_planning_request_is_a_row() -> None:
         6,
     ]
     assert math.isnan(row["effective_s"])
+    assert math.isnan(row["delay_s"])  # an earlier record does not tell it
+
+
+def test_a_delay_that_a_record_does_not_tell_comes_from_its_log(tmp_path: Path) -> None:
+    """Records written before delays were kept get theirs when the tables are made again."""
+    remaining_m = np.full(101, 0.5)
+    remaining_m[20:30] = 0.1  # blocked from 2.0 s to 3.0 s
+    log = make_log(
+        still_curve(),
+        still_curve(),
+        remaining_clearance_m=remaining_m,
+        replans=(make_replan(0.0, "first"), make_replan(2.5, "map")),
+    )
+    cell = {**RECORD, "replans": [{**RECORD["replans"][0], "time_s": time_s} for time_s in (0.0, 2.5)]}
+    trial = tmp_path / "trials" / trial_name(cell)
+    trial.mkdir(parents=True)
+    (trial / "record.json").write_text(seal(cell))
+    study = Study(
+        folder=tmp_path, name="", title="", report="", axes={"cell": ("mcr",)}, seeds=(3,), settings={},
+        cells=(StudyCell(digest=cell_digest(cell), labels={"cell": "mcr"}),),
+    )  # fmt: skip
+    (tmp_path / "study.json").write_text(study_text(study))
+    collect(tmp_path)
+    assert read_study(tmp_path).replans["delay_s"].isna().all()  # no log either
+    write_log(trial / "log.npz", log_arrays(log))
+    collect(tmp_path)
+    replans = read_study(tmp_path).replans
+    assert replans["blocked_since_s"].tolist() == pytest.approx([math.nan, 2.0], nan_ok=True)
+    assert replans["delay_s"].tolist() == pytest.approx([math.nan, 0.5], nan_ok=True)
 
 
 def test_a_world_comes_back_as_it_was_and_equal_worlds_give_equal_bytes(tmp_path: Path) -> None:

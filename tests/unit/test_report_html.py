@@ -152,6 +152,18 @@ class TestFailedTrials:
             command = read_wall(study.folder / TRIALS / trial).get("command")
             assert command is None or command in page.words
 
+    def test_without_a_stored_picture_there_is_no_link_but_the_command_that_makes_it(self, flown, tmp_path):  # noqa: F811
+        study = copy_of(flown, tmp_path / "packed")
+        for picture in (study.folder / TRIALS).glob("*/picture.png"):
+            picture.unlink()
+        page = Page(written(study))
+        assert self.rows(page) == []
+        failed = study.trials[~study.trials["success"]]
+        assert "Where no picture is kept, the command makes it." in page.words
+        assert page.words.count("not kept") == len(failed) > 0
+        for command in failed["wall_command"]:
+            assert command in page.words
+
     def test_trials_that_succeeded_are_not_listed(self, flown, page):  # noqa: F811
         won = set(flown.trials[flown.trials["success"]]["trial"])
         assert not won & {href.split("/")[1] for href in self.rows(page)}

@@ -14,11 +14,13 @@ import pyarrow as pa
 import pytest
 from pyarrow import parquet
 
+from tests.studies import copy_of, flown  # noqa: F401
 from tests.unit.test_report_tables import BAD, GOOD, WORST, trials_of
 from uavexp.errors import RecordError
 from uavexp.records import RECORD
 from uavexp.report import make
 from uavexp.report.__main__ import main
+from uavexp.study import Study
 from uavexp.table import FIRST_OF_REPLANS, REPLANS, TABLE
 
 REPLAN_COLUMNS = [*FIRST_OF_REPLANS, "arm", "scene", "status", "path_change_m"]
@@ -120,6 +122,50 @@ def test_a_study_without_a_trial_says_so(tmp_path: Path) -> None:
     parquet.write_table(empty, folder / TABLE, write_page_checksum=True)
     with pytest.raises(RecordError, match="no trial yet"):
         make.make_report(folder)
+
+
+def test_files_of_an_earlier_report_go_and_no_others(tmp_path: Path) -> None:
+    folder = write_study(tmp_path / "study")
+    before = {str(file.relative_to(folder)) for file in make.make_report(folder)}
+    kept = [folder / "tables" / "mine.csv", folder / "figures" / "mine.png", folder / "mine.txt"]
+    for file in kept:
+        file.write_text("mine")
+    with (folder / make.MANIFEST).open("a") as manifest:
+        manifest.write("mine.txt\n../../outside\ntrials.parquet\n")  # not a report's to remove
+    write_study(folder, report="")
+    after = {str(file.relative_to(folder)) for file in make.make_report(folder)}
+    assert {"tables/table1.csv", "claims.md", "figures/figure_6.pdf"} <= before - after
+    assert not any((folder / name).exists() for name in before - after)
+    assert all(file.is_file() for file in (*kept, folder / TABLE, *(folder / name for name in after)))
+
+
+@pytest.mark.parametrize("deed", ["cut", "gone"])
+def test_a_damaged_world_costs_its_figures_alone_and_is_told(
+    flown: Study,  # noqa: F811
+    deed: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Used to end the whole report."""
+    study = copy_of(flown, tmp_path / "study")
+    first = study.trials[study.trials["scene"] == study.axes["scene"][0]]
+    for digest in set(first["world_digest"]):
+        world = study.folder / "worlds" / f"{digest}.npz"
+        if deed == "cut":
+            world.write_bytes(world.read_bytes()[:1000])
+        else:
+            world.unlink()
+    assert main([str(study.folder)]) == 0
+    out = capsys.readouterr().out
+    page = (study.folder / "report.html").read_text()
+    for name in ("figure_3", "figure_5", "figure_8"):
+        (line,) = [line for line in out.splitlines() if f"{name} is left out" in line]
+        assert ("worlds/" in line and "damaged" in line) if deed == "cut" else "hold no world" in line
+        assert f"{name} is left out" in page
+        assert not (study.folder / "figures" / f"{name}.png").exists()
+    assert "a flight in 3D is left out" in page
+    assert str(study.folder) not in page
+    assert (study.folder / "figures" / "figure_6.png").is_file()
 
 
 def test_tables_older_than_a_record_are_collected_again(

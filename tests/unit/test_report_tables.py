@@ -15,7 +15,7 @@ import pandas as pd
 import pytest
 
 from uavexp.errors import RecordError
-from uavexp.report import cells, make, robustness, shown, table1, tables, tradeoff
+from uavexp.report import cells, make, robustness, shown, summary, table1, tables, tradeoff
 from uavexp.report.comparison import compare, estimate, pairs_of, panel_of
 from uavexp.report.contradictions import least_spread, possible_rate
 from uavexp.report.findings import study_panel
@@ -316,7 +316,28 @@ def test_a_named_default_setting_stands_for_mcr(trials: pd.DataFrame) -> None:
         assert "Holm over 1 arms" in found.claims[0].evidence
 
 
-def robustness_study(noisy_false_triggers: int) -> Study:
+def test_a_count_that_never_occurred_is_bounded_and_other_equal_values_have_no_interval() -> None:
+    trials = trials_of({"MCR": GOOD}).assign(time_below_safety_s=0.0)
+    panel = study_panel(study_of(trials), (shown.CONTACTS, shown.UNSAFE, shown.REPLANS))
+    contacts, unsafe, replans = (
+        cells.mean_with_interval(estimate(panel, metric, "MCR"), metric, 60)
+        for metric in (shown.CONTACTS, shown.UNSAFE, shown.REPLANS)
+    )
+    assert contacts == "0.00 [0.00, 0.06]"  # 3.69 / 60
+    assert unsafe == "0.00"
+    assert replans.startswith("10.5 [")
+
+
+def test_trials_of_two_versions_say_so() -> None:
+    trials = trials_of({"MCR": GOOD}).assign(code="a" * 12)
+    assert not any("pooled" in note for note in summary.findings(study_of(trials)).tables[0].notes)
+    trials.loc[:6, "code"] = "b" * 12
+    (note,) = [note for note in summary.findings(study_of(trials)).tables[0].notes if "pooled" in note]
+    assert "2 versions" in note
+    assert f"53 of {'a' * 12}, 7 of {'b' * 12}" in note
+
+
+def robustness_study(noisy_false_triggers: int, **settings: Any) -> Study:
     levels = [("none", "0"), ("low", "0"), ("none", "0.1"), ("low", "0.1")]
     parts = [trials_of({"MCR": GOOD}).assign(noise=noise, latency=latency) for noise, latency in levels]
     trials = pd.concat(parts, ignore_index=True).drop(columns="arm")
@@ -329,7 +350,7 @@ def robustness_study(noisy_false_triggers: int) -> Study:
     ]
     useful = [{**base, "trial": "trial-0", "path_change_m": 2.0}, {**base, "trial": "trial-0", "number": 0}]
     late = [{**base, "trial": "trial-0", "effective_s": 1e9}, {**base, "trial": "trial-0", "cause": "goal"}]
-    study = study_of(trials, "robustness")
+    study = study_of(trials, "robustness", **settings)
     study.__dict__["replans"] = pd.DataFrame([*replans, *useful, *late])
     return study
 
@@ -341,6 +362,20 @@ def test_false_triggers_are_map_replans_that_changed_nothing() -> None:
     expected = 3.0 / (with_rates["completion_time_s"] / 60.0)
     np.testing.assert_allclose(with_rates.loc[low, "false_triggers_per_min"], expected[low])
     assert (with_rates.loc[~low, "false_triggers_per_min"] == 0.0).all()
+
+
+def test_the_levels_that_claims_are_about_are_named() -> None:
+    """Used to be the second of each axis, whatever an experiment calls moderate."""
+    claims = robustness.findings(robustness_study(0, small_noise="low", moderate_latency="0.1")).claims
+    assert claims == robustness.findings(robustness_study(0)).claims
+    turned = robustness_study(3, none={"noise": "low", "latency": "0.1"}, small_noise="none")
+    found = robustness.findings(turned)
+    assert verdict_of(found.claims, "Small sensor noise (none) does not fire the trigger") is (
+        Verdict.REPRODUCED
+    )
+    assert not any("latency" in claim.statement for claim in found.claims)  # 0.1 disturbs nothing here
+    unflown = robustness.findings(robustness_study(0, small_noise="lower"))
+    assert not any("noise" in claim.statement for claim in unflown.claims)
 
 
 def test_noise_that_fires_the_trigger_and_noise_that_does_not() -> None:

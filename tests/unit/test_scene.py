@@ -40,7 +40,7 @@ def test_distance_and_closest_point_equal_the_closed_form_of_a_box() -> None:
     points = np.random.default_rng(0).uniform(-4.0, 4.0, (2000, 3))
     expected = distance_to_box_surface(points, low, high)
     np.testing.assert_allclose(scene.distance_m(points), expected, atol=2e-6)
-    closest = scene.closest_point_m(points)
+    closest = scene.fixed_closest_point_m(points)
     np.testing.assert_allclose(np.linalg.norm(points - closest, axis=1), expected, atol=4e-6)
     np.testing.assert_allclose(distance_to_box_surface(closest, low, high), 0.0, atol=2e-6)
 
@@ -65,7 +65,7 @@ def test_empty_space_has_no_hits_no_touch_and_infinite_distance() -> None:
     assert np.isinf(t).all()
     assert (normal == 0.0).all()
     assert np.isinf(scene.distance_m(np.zeros((3, 3)))).all()
-    assert np.isinf(scene.closest_point_m(np.zeros((3, 3)))).all()
+    assert np.isinf(scene.fixed_closest_point_m(np.zeros((3, 3)))).all()
     assert not scene.touches(np.zeros(3), np.eye(3), np.ones(3))
 
 

@@ -113,6 +113,22 @@ def test_one_unit_has_no_bootstrap_interval() -> None:
     assert all(math.isnan(end) for end in statistics.mean_interval(np.array([3.0]), np.array([0])))
 
 
+@pytest.mark.parametrize("value", [0.0, 0.1, 7.0])
+def test_equal_values_have_no_bootstrap_interval(value: float) -> None:
+    """Used to be one of no width, as if further flights could not differ."""
+    values, scene = np.full(200, value), np.repeat(np.arange(10), 20)
+    assert all(math.isnan(end) for end in statistics.mean_interval(values, scene))
+    ends = statistics.mean_interval(np.append(values[:-1], value + 1.0), scene)
+    assert ends.low < ends.high
+
+
+def test_no_event_in_n_flights_bounds_their_mean() -> None:
+    """At the upper end, no event in any of n flights has probability 2.5 % (Poisson)."""
+    ends = statistics.no_event_interval(200)
+    assert ends.low == 0.0
+    assert stats.poisson.cdf(0, 200 * ends.high) == pytest.approx(0.025)
+
+
 def brute_force_p(means: list[float]) -> float:
     observed = abs(sum(means))
     patterns = list(itertools.product([1.0, -1.0], repeat=len(means)))

@@ -5,13 +5,18 @@ from __future__ import annotations
 import dataclasses
 import multiprocessing
 import os
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
+from uavexp.cli.composition import Composer
+from uavexp.cli.folders import opened
 from uavexp.errors import RecordError
 from uavexp.study import Study, StudyCell, read_study, study_text, trial_folders
-from uavexp.sweep.folder import locked, put_trial, put_world, remove_unfinished, set_aside
+from uavexp.sweep.folder import LOCK, locked, put_trial, put_world, remove_unfinished, set_aside
 from uavexp.sweep.resume import join_studies
 
 
@@ -60,10 +65,15 @@ def test_what_a_killed_sweep_was_writing_is_removed(tmp_path: Path) -> None:
     ]
 
 
-def test_a_world_is_written_once(tmp_path: Path) -> None:
-    put_world(tmp_path, "digest", b"one")
-    put_world(tmp_path, "digest", b"another")
-    assert (tmp_path / "worlds" / "digest.npz").read_bytes() == b"one"
+def test_a_world_is_written_once_and_mended_when_it_was_cut(tmp_path: Path) -> None:
+    file = tmp_path / "worlds" / "digest.npz"
+    put_world(tmp_path, "digest", b"whole")
+    written = file.stat().st_ino
+    put_world(tmp_path, "digest", b"whole")
+    assert file.stat().st_ino == written
+    file.write_bytes(b"who")
+    put_world(tmp_path, "digest", b"whole")
+    assert file.read_bytes() == b"whole"
 
 
 def test_set_aside_takes_the_first_free_number(tmp_path: Path) -> None:
@@ -91,6 +101,54 @@ def test_a_folder_has_one_writer_and_a_dead_one_holds_nothing(tmp_path: Path) ->
     holder.join()
     with locked(tmp_path):
         assert (tmp_path / ".lock").read_text() == str(os.getpid())
+
+
+def _count(folder: Path, total: Path, times: int) -> None:
+    """Add to a number in a file, which only holders of the lock may do; leave no lock file behind."""
+    done = 0
+    while done < times:
+        try:
+            with locked(folder):
+                total.write_text(str(int(total.read_text()) + 1))
+                done += 1
+                (folder / LOCK).unlink()
+        except RecordError:
+            continue
+
+
+def test_a_lock_whose_file_is_removed_by_its_holder_has_one_holder(tmp_path: Path) -> None:
+    """Used to lock the removed file beside a new one of the same name."""
+    total = tmp_path / "total"
+    total.write_text("0")
+    context = multiprocessing.get_context("spawn")
+    counters = [context.Process(target=_count, args=(tmp_path, total, 300)) for _ in range(3)]
+    for counter in counters:
+        counter.start()
+    for counter in counters:
+        counter.join()
+    assert total.read_text() == "900"
+
+
+def test_commands_that_begin_together_get_folders_of_their_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Used to share a number when both looked before either had made its folder."""
+    monkeypatch.setattr("uavexp.cli.folders.outputs_root", lambda: tmp_path / "outputs")
+    command = Composer().command([])
+    together = threading.Barrier(8)
+
+    def claim(_: int) -> Path:
+        with ExitStack() as stack:
+            together.wait()
+            folder = stack.enter_context(opened(command))
+            together.wait()
+            (folder / "study.json").touch()  # or the empty folder would be removed again
+        return folder
+
+    with ThreadPoolExecutor(8) as pool:
+        folders = list(pool.map(claim, range(8)))
+    assert sorted(folders) == sorted((tmp_path / "outputs").iterdir())
+    assert len(set(folders)) == 8
 
 
 def test_a_study_comes_back_as_it_was(tmp_path: Path) -> None:

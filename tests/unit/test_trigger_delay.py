@@ -9,6 +9,7 @@ import pytest
 
 from tests.logs import make_log, make_replan, make_world, still_curve
 from uavexp.metrics import evaluate
+from uavexp.metrics.replanning import blocked_delays, request_delays
 from uavexp.types import Contact
 
 WORLD = make_world([])
@@ -73,6 +74,38 @@ class TestBlocked:
         assert math.isnan(
             evaluate(make_log(still_curve(), still_curve(), **fields), WORLD)["blocked_episodes"]
         )
+
+    def test_requests_tell_the_delays_that_the_mean_is_made_of(self):
+        """The first request since the same update answers; requests outside an episode have no delay."""
+        rng = np.random.default_rng(11)
+        told = 0
+        for _ in range(50):
+            remaining_m = np.where(np.repeat(rng.random(21) < 0.4, 5)[:101], 0.1, 0.5)
+            times_s = np.sort(rng.choice(1001, 8, replace=False)) * 0.01
+            log = make_log(
+                still_curve(),
+                still_curve(),
+                remaining_clearance_m=remaining_m,
+                replans=tuple(make_replan(float(t), "map") for t in times_s),
+                contacts=tuple(
+                    Contact(start_s=float(t), end_s=float(t) + 0.2, position_m=np.zeros(3))
+                    for t in np.sort(rng.uniform(0.0, 10.0, 2))
+                ),
+            )
+            delays = request_delays(log)
+            for replan, delay in zip(log.replans, delays, strict=True):
+                if not math.isnan(delay.delay_s):
+                    assert delay.blocked_since_s + delay.delay_s == pytest.approx(replan.time_s)
+                    since, until = np.round(10.0 * np.array([delay.blocked_since_s, replan.time_s]), 6)
+                    assert (remaining_m[int(since) : int(until) + 1] < log.body_radius_m).all()
+                    told += 1
+            first: dict[float, float] = {}
+            for delay in delays:
+                first.setdefault(delay.blocked_since_s, delay.delay_s)
+            answered = [delay_s for since_s, delay_s in first.items() if not math.isnan(since_s)]
+            mean_s = blocked_delays(log)["blocked_delay_s"]
+            assert mean_s == pytest.approx(np.mean(answered) if answered else math.nan, nan_ok=True)
+        assert told > 50
 
     def test_every_episode_is_answered_unanswered_or_cleared(self):
         rng = np.random.default_rng(5)

@@ -1,15 +1,14 @@
-"""Overrides in, checked cells out: the only module that composes with Hydra.
+"""Overrides in, checked cells out.
 
-Hydra composes the chosen options once per combination of options; the values are applied
-here, so that a grid over a parameter costs nothing and each mistake is told in the user's
-own words. The resolved tree is plain data from here on and is checked (`trust`,
-`uavexp.build.check_config`) before anything is built.
+Hydra composes the chosen options (`trees`); the values are applied here, so that a grid over
+a parameter costs nothing and each mistake is told in the user's own words. The resolved tree
+is plain data from here on and is checked (`trust`, `uavexp.build.check_config`) before
+anything is built.
 """
 
 from __future__ import annotations
 
 import copy
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,20 +16,18 @@ from typing import Any
 
 from uavexp.build import GROUPS, TOP_LEVEL, check_config
 from uavexp.cli.experiment import Experiment, LabelledCell, expand, list_experiments, read_experiment
-from uavexp.cli.interpolation import one_line, resolved
+from uavexp.cli.interpolation import resolved
 from uavexp.cli.options import EXPERIMENT_GROUP, PRESET_GROUP, RUNNER_GROUP, list_options, read_option
-from uavexp.cli.overrides import Setting, expand_grid, expand_seeds, quoted, render
+from uavexp.cli.overrides import Setting, expand_grid, expand_seeds, render
+from uavexp.cli.trees import TRIGGER_GROUP, Trees
 from uavexp.errors import ConfigError
 from uavexp.parameters import nearest
 from uavexp.paths import conf_folder
 from uavexp.trust import check_trust
 
-TRIGGER_GROUP = "trigger"  # what presets choose
 DEFAULT_PRESET = "mcr"  # config.yaml's
 CELL_AXIS = "cell"
 _FEW_CELLS = 8  # up to so many are composed one by one: 0.15 s each
-_OF_ONE_COMPOSITION = ("runtime", "overrides", "job")  # parts of `hydra` that only tell what was typed
-CONFIG_NAME = "config"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,6 +50,7 @@ class Command:
     out: str | None
     axes: dict[str, tuple[str, ...]]  # values in order; the one axis `cell` without an experiment
     runner: dict[str, Any]  # how trials are run; no part of what is flown
+    settings: tuple[Setting, ...]  # all that was typed
     experiment: Experiment | None = None
 
 
@@ -63,14 +61,13 @@ class Composer:
     user_folder: Path | None = None
     options: dict[str, dict[str, Path]] = field(init=False)
     experiments: dict[str, Path] = field(init=False)
-    _cache: dict[tuple[tuple[str, str], ...], dict[str, Any]] = field(init=False, repr=False)
-    _many: bool = field(init=False, repr=False, default=False)
+    _trees: Trees = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         folders = [conf_folder(), *([self.user_folder] if self.user_folder else [])]
         self.options = list_options(folders)
         self.experiments = list_experiments(self.user_folder)
-        self._cache = {}
+        self._trees = Trees(user_folder=self.user_folder)
 
     def command(self, settings: Sequence[Setting]) -> Command:
         """Expand, compose and check everything a command line asks for.
@@ -83,7 +80,7 @@ class Composer:
         runner = {key: typed.pop(key) for key in list(typed) if key.split(".")[0] == RUNNER_GROUP}
         experiment = self._experiment(ours.get(EXPERIMENT_GROUP))
         labelled, axes = self._grid(experiment, list(typed.values()))
-        self._many = len(labelled) > _FEW_CELLS
+        self._trees.many = len(labelled) > _FEW_CELLS
         defaults = self.compose([*_single(runner.values()), *labelled[0].settings])
         seed = (
             ours["seed"].values if "seed" in ours else (experiment.seed if experiment else defaults["seed"],)
@@ -100,6 +97,7 @@ class Composer:
             out=out[0],
             axes=axes,
             runner=defaults[RUNNER_GROUP],
+            settings=tuple(settings),
             experiment=experiment,
         )
 
@@ -161,7 +159,7 @@ class Composer:
     def compose(self, settings: Sequence[Setting]) -> dict[str, Any]:
         """Compose one cell into a plain, resolved, trusted tree, `hydra` included."""
         chosen, values = self._split(settings)
-        tree = copy.deepcopy(self._compose_options(tuple(sorted(chosen.items()))))
+        tree = copy.deepcopy(self._trees.of(chosen))
         for setting in values:
             self._apply(tree, setting)
         tree = resolved(tree)
@@ -186,73 +184,6 @@ class Composer:
         raise ConfigError(
             f"{group}={name}: no such option{nearest(str(name), known)}; {group} may be {', '.join(known)}"
         )
-
-    def _compose_options(self, chosen: tuple[tuple[str, str], ...]) -> dict[str, Any]:
-        """Hydra's tree of these options, unresolved; once for each combination."""
-        if chosen not in self._cache:
-            joined = self._join(dict(chosen)) if self._many and len(chosen) > 1 else None
-            self._cache[chosen] = joined or self._hydra_compose(dict(chosen))
-        return self._cache[chosen]
-
-    def _join(self, chosen: Mapping[str, str]) -> dict[str, Any] | None:
-        """The tree of several options from trees of one each: a grid needs their sum, not their product.
-
-        None where an option touches more than its own group, or the preset touches that group.
-        """
-        preset = {group: option for group, option in chosen.items() if group in (PRESET_GROUP, TRIGGER_GROUP)}
-        if preset == chosen:
-            return None
-        plain = self._compose_options(())
-        tree = copy.deepcopy(self._compose_options(tuple(sorted(preset.items()))))
-        for group, option in chosen.items():
-            if group in preset:
-                continue
-            alone = self._compose_options(((group, option),))
-            if _without(alone, group) != _without(plain, group) or tree[group] != plain[group]:
-                return None
-            tree[group] = copy.deepcopy(alone[group])
-            tree["hydra"]["runtime"]["choices"][group] = option
-        return tree
-
-    def _hydra_compose(self, chosen: Mapping[str, str]) -> dict[str, Any]:
-        arguments = [f"{group}={name}" for group, name in chosen.items()]
-        if TRIGGER_GROUP in chosen and PRESET_GROUP not in chosen:
-            arguments.append(f"~{PRESET_GROUP}")  # the default preset's name would be wrong
-        tree = self._hydra_tree(arguments)
-        if TRIGGER_GROUP in chosen and PRESET_GROUP in chosen:
-            preset = self._hydra_tree([f"{PRESET_GROUP}={chosen[PRESET_GROUP]}"])
-            wanted = preset["hydra"]["runtime"]["choices"][TRIGGER_GROUP]
-            if wanted != chosen[TRIGGER_GROUP]:
-                raise ConfigError(
-                    f"{PRESET_GROUP}={chosen[PRESET_GROUP]} means {TRIGGER_GROUP}={wanted}, "
-                    f"{TRIGGER_GROUP}={chosen[TRIGGER_GROUP]} contradicts it: give one of the two"
-                )
-        return tree
-
-    def _hydra_tree(self, arguments: list[str]) -> dict[str, Any]:
-        import yaml  # type: ignore[import-untyped]
-        from hydra import compose, initialize_config_dir
-        from hydra.core.global_hydra import GlobalHydra
-        from hydra.errors import HydraException
-        from omegaconf import OmegaConf
-        from omegaconf.errors import OmegaConfBaseException
-
-        bad_input = (HydraException, OmegaConfBaseException, yaml.YAMLError, OSError, ValueError, KeyError)
-
-        if self.user_folder is not None:
-            arguments = [*arguments, f"hydra.searchpath=[{_file_url(self.user_folder)}]"]
-        GlobalHydra.instance().clear()
-        try:
-            with (
-                warnings.catch_warnings(),
-                initialize_config_dir(config_dir=str(conf_folder()), version_base="1.3", job_name="uavexp"),
-            ):
-                warnings.simplefilter("ignore")
-                composed = compose(CONFIG_NAME, overrides=arguments, return_hydra_config=True)
-            tree: Any = OmegaConf.to_container(composed, resolve=False)
-        except bad_input as error:
-            raise ConfigError(f"the configuration does not compose: {one_line(error)}") from error
-        return dict(tree)
 
     def _apply(self, tree: dict[str, Any], setting: Setting) -> None:
         """Set one value in place; the key must exist unless it is added."""
@@ -305,19 +236,9 @@ def _single(settings: Iterable[Setting]) -> list[Setting]:
     return found
 
 
-def _without(tree: Mapping[str, Any], group: str) -> dict[str, Any]:
-    """A composed tree without one group, and without what `hydra` tells of the composition itself."""
-    hydra = {key: value for key, value in tree["hydra"].items() if key not in _OF_ONE_COMPOSITION}
-    return {**{key: value for key, value in tree.items() if key != group}, "hydra": hydra}
-
-
 def _refuse_equal_cells(cells: Sequence[Cell]) -> None:
     for index, cell in enumerate(cells):
         for other in cells[:index]:
             if cell.strategy == other.strategy and cell.config == other.config:
                 typed = " ".join(f"{setting.key}={setting.values[0]}" for setting in cell.settings)
                 raise ConfigError(f"the same configuration twice in one command: {typed}")
-
-
-def _file_url(folder: Path) -> str:
-    return quoted(f"file://{folder}")

@@ -29,7 +29,7 @@ from pathlib import Path
 from typing import Any
 
 from uavexp.cli.overrides import Setting, expand_grid, flatten, parse_settings, render
-from uavexp.errors import ConfigError
+from uavexp.errors import ConfigError, one_line
 from uavexp.parameters import nearest
 from uavexp.paths import experiments_folder
 
@@ -118,7 +118,7 @@ def _load(name: str, file: Path) -> dict[Any, Any]:
     try:
         tree = yaml.safe_load(file.read_text(encoding="utf-8"))
     except (OSError, yaml.YAMLError) as error:
-        raise ConfigError(f"experiments={name} cannot be read: {' '.join(str(error).split())}") from error
+        raise ConfigError(f"experiments={name} cannot be read: {one_line(error)}") from error
     return tree if isinstance(tree, dict) else {}
 
 

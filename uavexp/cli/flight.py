@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,9 +12,8 @@ from uavexp.build import build
 from uavexp.cli.composition import Cell, Composer
 from uavexp.cli.overrides import flatten, parse_settings, render
 from uavexp.errors import ConfigError
+from uavexp.sweep.job import Progress
 from uavexp.types import TrialLog, World
-
-Progress = Callable[[float, str], None]  # simulated time s, a few words
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

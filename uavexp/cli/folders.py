@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from uavexp.cli.composition import Command
@@ -36,34 +36,55 @@ def folder_of(command: Command) -> Path:
 
 
 @contextmanager
-def opened(folder: Path) -> Iterator[None]:
-    """Make the folder and hold its lock; if no trial came of it, what was made is removed again.
+def opened(command: Command) -> Iterator[Path]:
+    """Make a command's folder and hold its lock; if no trial came of it, what was made is removed again.
 
     Raises:
-        ConfigError: it cannot be written.
+        ConfigError: it holds something else than a study, or cannot be written.
         RecordError: another command is flying into it.
     """
-    made = [path for path in (folder, *folder.parents) if not path.exists()]
+    made: list[Path] = []
     try:
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            tempfile.TemporaryFile(dir=folder).close()
-        except OSError as error:
-            raise ConfigError(
-                f"cannot write to the output folder {folder} ({error.strerror}); use out=DIR"
-            ) from error
+        folder = _make(command, made)
         with locked(folder):
             try:
-                yield
+                yield folder
             finally:
                 if not (folder / STUDY).exists():
                     (folder / LOCK).unlink(missing_ok=True)
     finally:
-        for path in (folder / TRIALS, folder / WORLDS, *made):
-            try:
+        for path in made:
+            with suppress(OSError):
                 path.rmdir()  # only an empty one
-            except OSError:
-                continue
+
+
+def _make(command: Command, made: list[Path]) -> Path:
+    """Make the folder of a command; a numbered one is new, also when another command takes its number.
+
+    Args:
+        command: whose folder.
+        made: takes the folders that were not there before, the inmost first.
+    """
+    numbered = command.out is None and command.experiment is None
+    while True:
+        folder = folder_of(command)
+        made[:] = [
+            path for path in (folder / TRIALS, folder / WORLDS, folder, *folder.parents) if not path.exists()
+        ]
+        try:
+            folder.mkdir(parents=True, exist_ok=not numbered)
+            tempfile.TemporaryFile(dir=folder).close()
+        except FileExistsError as error:
+            if not numbered:
+                raise _unwritable(folder, error) from error
+        except OSError as error:
+            raise _unwritable(folder, error) from error
+        else:
+            return folder
+
+
+def _unwritable(folder: Path, error: OSError) -> ConfigError:
+    return ConfigError(f"cannot write to the output folder {folder} ({error.strerror}); use out=DIR")
 
 
 def _prefix(command: Command) -> str:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
-from uavexp.cli.options import EXPERIMENT_GROUP, RUNNER_GROUP
-from uavexp.cli.overrides import Setting, expand_seeds
+from uavexp.cli.options import RUNNER_GROUP
+from uavexp.cli.overrides import Setting
 from uavexp.kernel_cache import has_kernels
 from uavexp.sweep.local import start_fork_server
 
@@ -14,11 +13,7 @@ PRELOAD = "uavexp.cli.preload"
 
 
 def give_head_start(settings: Sequence[Setting]) -> None:
-    """Start the fork server if these settings will need it and it has kernels to load.
-
-    Raises:
-        ConfigError: bad seeds.
-    """
+    """Start the fork server if these settings will need it and it has kernels to load."""
     if has_kernels() and _need_fork_server(settings):
         start_fork_server([PRELOAD])
 
@@ -27,8 +22,4 @@ def _need_fork_server(settings: Sequence[Setting]) -> bool:
     values = {setting.key: setting.values for setting in settings}
     if values.get(f"{RUNNER_GROUP}.dry_run", (False,)) != (False,):
         return False
-    if "dask" in (*values.get(RUNNER_GROUP, ()), *values.get(f"{RUNNER_GROUP}.backend", ())):
-        return False
-    seeds = expand_seeds(values.pop("seed")) if "seed" in values else (0,)
-    many = len(seeds) * math.prod(len(item) for item in values.values()) > 1
-    return many or values.get(EXPERIMENT_GROUP, (None,)) != (None,)
+    return "dask" not in (*values.get(RUNNER_GROUP, ()), *values.get(f"{RUNNER_GROUP}.backend", ()))

@@ -31,7 +31,8 @@ output    trials.parquet, replans.parquet and one folder per trial with record.j
           wall.json; in out=DIR or a new folder under outputs/, which is printed last
 studies   an experiment has one folder, outputs/NAME: the same command again flies what is missing
           or failed; python -m uavexp.report DIR makes tables and figures again without flying
-exit code 0 all flown, 1 some trial raised, 2 bad input (one line says what), 130 interrupted
+exit code 0 all flown, 1 some trial did not run to its end or the disk was full,
+          2 bad input (one line says what), 130 interrupted
 
 flags
   -h, --help [GROUP]   this text, or one group's parameters

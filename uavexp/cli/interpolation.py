@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from uavexp.errors import ConfigError
+from uavexp.errors import ConfigError, one_line
 
 _KEY_REFERENCE = re.compile(r"\$\{(\w+)\}")
 
@@ -27,7 +27,7 @@ def resolved(tree: dict[str, Any]) -> dict[str, Any]:
     try:
         resolved: Any = OmegaConf.to_container(OmegaConf.create(own), resolve=True)
     except OmegaConfBaseException as error:
-        raise ConfigError(f"the configuration does not resolve: {one_line(error)}") from error
+        raise ConfigError(f"the configuration does not resolve: {with_cause(error)}") from error
     return {**resolved, "hydra": hydra}
 
 
@@ -74,8 +74,7 @@ def _calls_resolver(text: str) -> bool:
         raise ConfigError(f"cannot read the value {text!r}") from error
 
 
-def one_line(error: BaseException) -> str:
-    """Message of an error and of its cause, without line breaks."""
-    text = " ".join(str(error).split())
+def with_cause(error: BaseException) -> str:
+    """Message of an error and of its cause, in one line."""
     cause = error.__cause__
-    return f"{text or type(error).__name__}" + (f" ({' '.join(str(cause).split())})" if cause else "")
+    return (one_line(error) or type(error).__name__) + (f" ({one_line(cause)})" if cause else "")

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from uavexp.cli.composition import Cell
-from uavexp.cli.flight import Progress, fly_cell
+from uavexp.cli.flight import fly_cell
 from uavexp.cli.outputs import failure_files, trial_files
 from uavexp.errors import RecordError
 from uavexp.records import code_digest, lock_digest
-from uavexp.sweep.job import Answer, Job
-from uavexp.worlds import world_bytes
+from uavexp.sweep.job import Answer, Job, Progress
+from uavexp.worlds import is_whole, world_bytes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +45,7 @@ def fly_task(task: Task, progress: Progress) -> Flown:
     trial = fly_cell(task.cell, task.seed, progress)
     wall = {"command": task.command, "wall_trial_s": time.perf_counter() - begin_s}
     digest = trial.world.digest
-    known = (task.worlds / f"{digest}.npz").exists()
+    known = is_whole(task.worlds / f"{digest}.npz")
     return Flown(
         files=trial_files(trial, {**task.identity, **task.version}, wall),
         world=(digest, None if known else world_bytes(trial.world)),
@@ -55,13 +55,18 @@ def fly_task(task: Task, progress: Progress) -> Flown:
     )
 
 
+def version() -> dict[str, Any]:
+    """What a record says of the code that wrote it: digests of uavexp and of its lock file."""
+    return {"code": code_digest(), "lock": lock_digest()}
+
+
 def fly_task_elsewhere(task: Task, progress: Progress) -> Flown:
     """Fly one trial on a worker, which must run the version that the record will name.
 
     Raises:
         RecordError: it runs another one.
     """
-    if {"code": code_digest(), "lock": lock_digest()} != task.version:
+    if version() != task.version:
         raise RecordError("this Dask worker runs another version of uavexp than the command")
     return fly_task(task, progress)
 

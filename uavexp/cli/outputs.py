@@ -82,13 +82,18 @@ def failure_files(answer: Answer, head: dict[str, Any], wall: dict[str, Any]) ->
 
 def measured(trial: Trial) -> dict[str, Any]:
     """Everything a table or figure needs of a flown trial, arrays apart."""
+    from uavexp.metrics.replanning import request_delays
+
     log, world = trial.log, trial.world
     return {
         "status": Status.OK,
         "outcome": log.outcome,
         "reason": log.reason,
         "metrics": trial.metrics,
-        "replans": [_replan(item) for item in log.replans],
+        "replans": [
+            {**_replan(item), **delay._asdict()}
+            for item, delay in zip(log.replans, request_delays(log), strict=True)
+        ],
         "contacts": [
             {"start_s": item.start_s, "end_s": item.end_s, "position_m": item.position_m}
             for item in log.contacts

@@ -7,14 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from uavexp.cli.composition import Command
+from uavexp.cli.composition import Command, Composer
 from uavexp.cli.flight import repeat_command
-from uavexp.cli.job import Task
+from uavexp.cli.job import Task, version
 from uavexp.cli.outputs import identity
-from uavexp.records import cell_digest, code_digest, lock_digest, trial_name
+from uavexp.cli.overrides import Setting
+from uavexp.records import cell_digest, trial_name
 from uavexp.study import STUDY, WORLDS, Study, StudyCell, read_study
 from uavexp.sweep.job import Job
-from uavexp.sweep.resume import Stock, join_studies, take_stock
+from uavexp.sweep.resume import Stock, contains, join_studies, take_stock
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,23 +45,58 @@ def plan_of(
     Raises:
         RecordError: the folder holds another study, or trials of another version.
     """
-    version = {"code": code_digest(), "lock": lock_digest()}
     identities = [identity(cell) for cell in command.cells]
     study = _study(command, folder, identities)
     if (folder / STUDY).exists():
-        study = join_studies(read_study(folder), study)
+        study = _joined(read_study(folder), study, command, user_folder)
     return Plan(
         study=study,
-        jobs=_jobs(command, folder, identities, version, user_folder),
-        stock=take_stock(folder, version, accept_other_code=accept_other_code),
+        jobs=_jobs(command, folder, identities, version(), user_folder),
+        stock=take_stock(folder, version(), accept_other_code=accept_other_code),
     )
+
+
+def _joined(stored: Study, asked: Study, command: Command, user_folder: Path | None) -> Study:
+    """The study of a folder after one more command: the larger of two, or two parts of one experiment.
+
+    Parts are told by the command typed with the entries of both: it must have the cells of both.
+
+    Raises:
+        RecordError: they do not belong together.
+    """
+    if contains(asked, stored) or contains(stored, asked) or not _is_part(command, stored):
+        return join_studies(stored, asked)
+    whole = _with_entries_of(stored, command, user_folder)
+    cells = [identity(cell) for cell in whole.cells]
+    return join_studies(stored, asked, whole=_study(whole, stored.folder, cells))
+
+
+def _is_part(command: Command, stored: Study) -> bool:
+    """Whether a command's experiment is the stored one's and still has the entries that were flown."""
+    experiment = command.experiment
+    return (
+        experiment is not None
+        and experiment.name == stored.name
+        and all(set(stored.axes.get(axis, ())) <= set(entries) for axis, entries in experiment.axes.items())
+    )
+
+
+def _with_entries_of(stored: Study, command: Command, user_folder: Path | None) -> Command:
+    """The command as if the entries flown before had been picked, too."""
+    axes = command.experiment.axes if command.experiment else {}
+    picked = [
+        Setting(key=axis, values=tuple(dict.fromkeys((*command.axes[axis], *stored.axes[axis]))))
+        for axis in axes
+    ]
+    others = [setting for setting in command.settings if setting.key not in axes]
+    return Composer(user_folder=user_folder).command([*others, *picked])
 
 
 def _jobs(
     command: Command,
     folder: Path,
     identities: list[dict[str, Any]],
-    version: Mapping[str, Any],
+    code: Mapping[str, Any],
     user_folder: Path | None,
 ) -> tuple[Job, ...]:
     """Cells x seeds, all cells of a seed together: an interrupted study is a balanced one."""
@@ -72,7 +108,7 @@ def _jobs(
                 cell=cell,
                 seed=seed,
                 identity={**whole, "seed": seed},
-                version=dict(version),
+                version=dict(code),
                 command=repeat_command(cell, seed, user_folder),
                 worlds=folder / WORLDS,
             ),

@@ -4,32 +4,29 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
-import platform
-import time
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-import uavexp
 from uavexp.cli import kernels
 from uavexp.cli.composition import Command
 from uavexp.cli.flight import check_world, fly_cell
 from uavexp.cli.folders import folder_of, opened
 from uavexp.cli.head_start import PRELOAD
-from uavexp.cli.job import Task, files_of, fly_task, fly_task_elsewhere
+from uavexp.cli.history import FLYING, Run
+from uavexp.cli.job import Task, files_of, fly_task, fly_task_elsewhere, version
 from uavexp.cli.plan import Plan, plan_of
-from uavexp.cli.runner import Backend, Runner, cores, read_runner
+from uavexp.cli.runner import Backend, Runner, read_runner
 from uavexp.cli.terminal import Terminal
-from uavexp.errors import ConfigError, RecordError, UavexpError
-from uavexp.records import canonical_json, write_text
-from uavexp.study import RUN, STUDY, collect, read_runs, study_text
+from uavexp.errors import ConfigError, RecordError, UavexpError, one_line
+from uavexp.records import write_text
+from uavexp.study import STUDY, collect, study_text
 from uavexp.sweep.dask import run_dask
-from uavexp.sweep.faults import failure, reason_of
+from uavexp.sweep.faults import reason_of
 from uavexp.sweep.folder import put_trial, put_world, remove_unfinished, set_aside
-from uavexp.sweep.job import Answer, Done, Job, Status
+from uavexp.sweep.job import Done, Job, Status
 from uavexp.sweep.local import Watch, run_local, start_fork_server
 
 _WARM_UP_S = 3.0  # simulated: by then every kernel of a flight has been called
@@ -53,57 +50,55 @@ def execute(
         UavexpError: bad input, told before anything was written; or a full disk.
     """
     runner = read_runner(command.runner)
-    folder = folder_of(command)
-    look = partial(plan_of, command, folder, user_folder, accept_other_code=runner.accept_other_code)
+    look = partial(plan_of, command, user_folder=user_folder, accept_other_code=runner.accept_other_code)
     if runner.dry_run:
-        terminal.listing(look(), folder)
+        folder = folder_of(command)
+        terminal.listing(look(folder), folder)
         return 0
-    with opened(folder):
-        plan = look()
+    with opened(command) as folder:
+        plan = look(folder)
         if plan.left:
             _prepare(plan, runner, terminal)
-        return _fly_plan(plan, command, runner, terminal, typed)
+        return _fly_plan(plan, command, terminal, Run(typed=typed, runner=runner))
 
 
 def _prepare(plan: Plan, runner: Runner, terminal: Terminal) -> None:
     """Have kernels compiled and the fork server started."""
-    alone = len(plan.jobs) == 1
     if not kernels.is_compiled():
         terminal.say("first run: compiling kernels takes about a minute")
-        if not alone:
-            _compile_kernels(plan.left[0])
-    if not alone and runner.backend == Backend.LOCAL:
+        _compile_kernels(plan.left[0])
+    if runner.backend == Backend.LOCAL:
         start_fork_server([PRELOAD])
 
 
-def _fly_plan(plan: Plan, command: Command, runner: Runner, terminal: Terminal, typed: Sequence[str]) -> int:
-    folder, began, failed = plan.study.folder, datetime.now(UTC), 0
-    kept = 0
+def _fly_plan(plan: Plan, command: Command, terminal: Terminal, run: Run) -> int:
+    folder, kept, failed = plan.study.folder, 0, 0
     with (
         terminal.progress(plan),
         _worlds_checked(plan) as wait_for_worlds,
-        contextlib.closing(_fly(plan, runner, terminal.watch)) as flying,
+        contextlib.closing(_fly(plan, run.runner, terminal.watch)) as flying,
     ):
         try:
             for done in flying:
                 if not kept:
                     wait_for_worlds()
-                    _begin(plan)
+                    _refuse_bad_input(plan, done)
+                    _begin(plan, run)
                 _keep(folder, done)
                 kept += 1
                 failed += done.answer.status is not Status.OK
                 terminal.finished(done)
-        except (KeyboardInterrupt, UavexpError):
+        except (KeyboardInterrupt, UavexpError) as error:
             with contextlib.suppress(RecordError):
                 if (folder / STUDY).exists():
+                    run.note(folder, _ending(error, folder), kept, failed)
                     collect(folder)
             terminal.stopped(folder, kept, len(plan.left), again=bool(command.out or command.experiment))
             raise
     if not plan.left:
-        _begin(plan)
+        _begin(plan, run)
     rows = collect(folder)
-    asked = [word for word in typed if not word.startswith("out=")]  # the folder may move
-    _note_run(folder, {"command": asked, "began": began, "flown": kept}, runner)
+    run.note(folder, "finished", kept, failed)
     terminal.summary(rows, plan)
     if command.experiment is not None:
         from uavexp.report.make import make_report
@@ -114,10 +109,15 @@ def _fly_plan(plan: Plan, command: Command, runner: Runner, terminal: Terminal, 
     return 1 if failed else 0
 
 
+def _ending(error: BaseException, folder: Path) -> str:
+    """How a run ended that did not finish, without the place of its folder."""
+    if isinstance(error, KeyboardInterrupt):
+        return "interrupted"
+    return f"failed: {one_line(error).replace(str(folder), folder.name)}"
+
+
 def _fly(plan: Plan, runner: Runner, watch: Watch) -> Generator[Done, None, None]:
-    """Fly what is left: each trial in a process of its own, here a trial that is all of a local command."""
-    if len(plan.jobs) == 1 and runner.backend == Backend.LOCAL:
-        return (_fly_here(job, watch) for job in plan.left)
+    """Fly what is left, each trial in a process of its own."""
     workers = min(runner.workers, max(1, len(plan.left)))
     if runner.backend == Backend.DASK:
         return run_dask(
@@ -128,28 +128,25 @@ def _fly(plan: Plan, runner: Runner, watch: Watch) -> Generator[Done, None, None
             n_jobs=workers,
             limits=runner.limits,
             preload=[PRELOAD],
+            version=version,
         )
     return run_local(fly_task, plan.left, n_jobs=workers, limits=runner.limits, watch=watch)
 
 
-def _fly_here(job: Job, watch: Watch) -> Done:
-    begin_s = time.monotonic()
-    try:
-        answer = Answer(status=Status.OK, value=fly_task(job.payload, partial(watch, job)))
-    except UavexpError:
-        raise  # bad input, and nothing is written yet
-    except Exception as error:
-        answer = failure(error)
-    return Done(job=job, answer=answer, wall_s=time.monotonic() - begin_s)
+def _refuse_bad_input(plan: Plan, done: Done) -> None:
+    """End a command of one trial that cannot be flown as asked, before anything is kept."""
+    if len(plan.jobs) == 1 and done.answer.mendable:
+        raise ConfigError(done.answer.reason.partition(": ")[2])
 
 
-def _begin(plan: Plan) -> None:
-    """Say what the folder is about, and put away what was found broken in it."""
+def _begin(plan: Plan, run: Run) -> None:
+    """Say what the folder is about and who flies into it, and put away what was found broken in it."""
     folder = plan.study.folder
     remove_unfinished(folder)
     for name in plan.stock.damaged:
         set_aside(folder, name)
     write_text(folder / STUDY, study_text(plan.study))
+    run.note(folder, FLYING)
 
 
 def _keep(folder: Path, done: Done) -> None:
@@ -159,21 +156,6 @@ def _keep(folder: Path, done: Done) -> None:
         if data is not None:
             put_world(folder, digest, data)
     put_trial(folder, done.job.name, files_of(done.job, done.answer, done.wall_s))
-
-
-def _note_run(folder: Path, run: dict[str, Any], runner: Runner) -> None:
-    """Add this run to the folder's own history."""
-    began = run.pop("began")
-    run |= {
-        "began": began.isoformat(timespec="seconds"),
-        "wall_s": (datetime.now(UTC) - began).total_seconds(),
-        "backend": runner.backend,
-        "n_jobs": runner.workers,
-        "uavexp": uavexp.__version__,
-        "python": platform.python_version(),
-        "machine": f"{platform.system()} {platform.machine()}, {cores()} cores",
-    }
-    write_text(folder / RUN, canonical_json({"runs": [*read_runs(folder), run]}) + "\n")
 
 
 @contextlib.contextmanager
@@ -211,4 +193,5 @@ def _warm_up(task: Task) -> None:
         if time_s >= _WARM_UP_S:
             raise SystemExit
 
-    fly_cell(task.cell, task.seed, stop)
+    with contextlib.suppress(Exception):  # the trial itself tells what is wrong
+        fly_cell(task.cell, task.seed, stop)

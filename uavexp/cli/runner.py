@@ -44,6 +44,10 @@ class Runner:
         if self.queue is not None:
             require_option("runner.queue", self.queue, Queue)
             require(self.n_jobs >= 1, "runner.queue=slurm needs runner.n_jobs=N, the workers to ask for")
+            require(
+                self.address is None,
+                "give runner.address or runner.queue, not both: a cluster or a way to one",
+            )
         if self.backend != Backend.DASK:
             require(self.address is None and self.queue is None, "runner.address and queue need runner=dask")
         require(self.n_jobs == -1 or self.n_jobs >= 1, f"runner.n_jobs must be -1 or >= 1, got {self.n_jobs}")

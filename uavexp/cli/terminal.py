@@ -22,6 +22,7 @@ from rich.progress import (
 from uavexp.cli.summary import cell_table, trial_table
 from uavexp.records import PICTURE
 from uavexp.study import TRIALS
+from uavexp.table import pooled_versions
 
 if TYPE_CHECKING:
     from uavexp.cli.plan import Plan
@@ -101,7 +102,7 @@ class Terminal:
                 self._bar.update(self._bar.task_ids[0], completed=self._done, description=rate)
             elif 1 < self._total <= _MOST_LINES:
                 why = f" ({reason})" if reason else ""
-                self.say(f"[{self._done}/{self._total}] {done.job.label}: {outcome}{why}")
+                self.say(f"{self._standing()}; {done.job.label}: {outcome}{why}")
             elif self._total > 1 and time.monotonic() - self._last_s > _PLAIN_PERIOD_S:
                 self.say(self._standing())
 
@@ -120,6 +121,8 @@ class Terminal:
             plan: what was asked; only its trials are shown.
         """
         commands = {job.name: job.payload.command for job in plan.jobs}
+        if pooled := pooled_versions((row["code"], row["lock"]) for row in rows):
+            self.say(pooled)
         rows = [row for row in rows if row["trial"] in commands]
         few = len(rows) <= _MAX_ROWS
         # as wide as it needs: a cut-off number is worse than a wrapped line
@@ -150,9 +153,8 @@ class Terminal:
 
     def _standing(self) -> str:
         left_s = (time.monotonic() - self._begin_s) / self._done * (self._total - self._done)
-        return (
-            f"[{self._done}/{self._total}] {self._successes / self._done:.0%} succeeded, "
-            f"about {_duration(left_s)} left"
+        return f"[{self._done}/{self._total}] {self._successes / self._done:.0%} succeeded" + (
+            f", about {_duration(left_s)} left" if self._done < self._total else ""
         )
 
 

@@ -6,26 +6,37 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from uavexp.bodies import distance_m, present
+from uavexp.detection.returns import returns, without
+from uavexp.errors import require_non_negative
 from uavexp.mapping.base import DistanceField
 from uavexp.types import Bodies, Limits, Scan, Tracks
 
 
 @dataclass(slots=True, kw_only=True)
 class Truth:
-    """Every body is known, whether it is in sight or not."""
+    """Every body is known, whether it is in sight or not; returns within `margin_m` of one are its own."""
+
+    margin_m: float = 0.1
+
+    def __post_init__(self) -> None:
+        require_non_negative(margin_m=self.margin_m)
 
     def reset(self, limits: Limits, rng: np.random.Generator) -> None:
         """Begin a trial; draws nothing."""
 
     def detect(self, scan: Scan, field: DistanceField, truth: Bodies) -> tuple[Scan, Tracks]:
-        """Return the tracks of all bodies."""
-        count = len(truth)
+        """Return the scan without the returns of bodies, and the tracks of all that are there."""
+        there = np.flatnonzero(present(truth.position_m))
         tracks = Tracks(
             time_s=scan.time_s,
-            identity=np.arange(count),
-            position_m=truth.position_m,
-            velocity_mps=truth.velocity_mps,
-            covariance=np.zeros((count, 6, 6)),
-            half_size_m=truth.half_size_m,
+            identity=there,
+            position_m=truth.position_m[there],
+            velocity_mps=truth.velocity_mps[there],
+            covariance=np.zeros((len(there), 6, 6)),
+            half_size_m=truth.half_size_m[there],
         )
-        return scan, tracks
+        if not len(there):
+            return scan, tracks
+        seen = returns(scan)
+        return without(scan, seen.where[distance_m(truth, seen.points_m) <= self.margin_m]), tracks

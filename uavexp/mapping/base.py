@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from uavexp.mapping.field import gradient_at, interpolate, observed_at
+from uavexp.scene import Scene
 from uavexp.types import Bool, Float, Float32, MapUpdate, Scan, UInt8
 
 UNKNOWN, FREE, OCCUPIED = 0, 1, 2  # values of `DistanceField.state`
@@ -64,8 +65,12 @@ class MapBackend(Protocol):
     voxel_size_m: float
     esdf_rate_hz: float
 
-    def reset(self, bounds_m: Float) -> None:
-        """Begin a trial with everything unknown inside `bounds_m` (2, 3)."""
+    def reset(self, bounds_m: Float, scene: Scene) -> None:
+        """Begin a trial inside `bounds_m` (2, 3) with everything unknown.
+
+        `scene` is the true geometry: a map that is known from the start is made of it, one that
+        has to be measured does not look at it.
+        """
         ...
 
     def mark_free(self, centre_m: Float, radius_m: float) -> None:

@@ -4,7 +4,7 @@ Projective fusion: a voxel's centre is projected into the nearest pixel; d is th
 depth minus the voxel's, both along the optical axis (as Open3D's VoxelBlockGrid does it).
 Column by column along z, everything is linear in z before the division by depth, so each
 column is cut to its part inside the frustum, and in front of the farthest surface in its
-pixel columns, before any voxel is looked at.
+pixel columns, before any voxel is looked at. Single rays are fused by `rays`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,9 @@ from uavexp.mapping.base import DistanceField
 from uavexp.mapping.frustum import column_depths, frustum_box
 from uavexp.mapping.occupancy import OccupancyMap, Rule, enlist, judge, keeps_free
 from uavexp.mapping.parameters import MapParameters
-from uavexp.types import DepthScan, Float, Float32, Int32, MapUpdate, UInt8
+from uavexp.mapping.rays import integrate_rays
+from uavexp.scene import Scene
+from uavexp.types import Float, Float32, Int32, MapUpdate, RayScan, Scan, UInt8
 
 _NEAR_M = 1e-3  # nothing is nearer to the camera than this
 
@@ -147,7 +149,7 @@ class Dense(MapParameters):
 
     _map: OccupancyMap | None = dataclasses.field(default=None, init=False, repr=False)
 
-    def reset(self, bounds_m: Float) -> None:
+    def reset(self, bounds_m: Float, scene: Scene) -> None:
         """Begin a trial with everything unknown inside `bounds_m` (2, 3).
 
         Raises:
@@ -159,9 +161,12 @@ class Dense(MapParameters):
         """Declare a ball known free as far as it is unknown; measured surfaces override it."""
         self._live().mark_free(centre_m, radius_m)
 
-    def integrate(self, scan: DepthScan) -> None:
+    def integrate(self, scan: Scan) -> None:
         """Fuse one scan."""
         grid = self._live()
+        if isinstance(scan, RayScan):
+            integrate_rays(scan, grid, self.rule())
+            return
         grid.changed = integrate_scan(
             scan.depth_m, np.array([*scan.focal_px, *scan.centre_px]), scan.max_range_m,
             scan.camera_rotation, scan.camera_position_m, grid.origin_m, grid.voxel_size_m, grid.shape,

@@ -44,7 +44,7 @@ _UNKNOWN, _FREE, _OCCUPIED = 0, 1, 2  # of `mapping.base`; literals so that kern
 _STATE, _LISTED, _EVIDENCE = 3, 4, 3
 LARGEST_EVIDENCE = 31
 _LONGEST = 30_000  # voxels along an axis: kernels count them in 16 bits
-_BYTES_PER_VOXEL = 50  # TSDF and state 7, ESDF 19, lists at their longest 16, Open3D's blocks 8
+_BYTES_PER_VOXEL = 58  # TSDF and state 7, ESDF 19, lists at their longest 16, rays 8, Open3D's blocks 8
 
 
 class Rule(NamedTuple):
@@ -224,6 +224,7 @@ class OccupancyMap:
         self.changed = 0  # how many of `changes` are in use
         self._flipped: Int32 = np.empty(size, np.int32)
         self._first_seen: Int32 = np.empty(size, np.int32)
+        self._rays: tuple[Float32, Int32] | None = None
         self._esdf = SignedDistance(self.shape, voxel_size_m, max_distance_m)
         self.field = DistanceField(
             origin_m=self.origin_m,
@@ -240,6 +241,13 @@ class OccupancyMap:
             centre, radius_m / self.voxel_size_m, self.shape, self.live, self.state, self.changes,
             self.changed,
         )  # fmt: skip
+
+    def ray_arrays(self) -> tuple[Float32, Int32]:
+        """Scratch of `rays`, made at first use: observations (N,), all inf, and a list of voxels (N,)."""
+        if self._rays is None:
+            size = self.tsdf_m.size
+            self._rays = np.full(size, np.inf, np.float32), np.empty(size, np.int32)
+        return self._rays
 
     def publish(self, time_s: float) -> MapUpdate:
         """Bring state and field up to what was integrated; return what changed since last time."""

@@ -9,6 +9,8 @@ Open3D fuses; this module decides which blocks it may touch and takes the result
   the intrinsics, and the image gets a spare row and column, for it ignores the last ones.
 - It treats NaN as a depth and infinity as too far: they are handed over as 0 (nothing) and as
   a depth that makes everything in range free.
+- It fuses images only: single rays are fused by the kernel of `rays`, as by `dense`, and the
+  voxels that they touch are written into its blocks, so that images go on from there.
 - It caps no weight and knows no `keeps_free`: afterwards a kernel goes through the blocks,
   recovers each observation d = (w + 1) D' - w D, takes it back where the rule forbids it,
   caps the weight, and moves occupancy exactly as the backend `dense` does.
@@ -28,14 +30,15 @@ import numpy as np
 
 from uavexp.errors import ConfigError, require
 from uavexp.mapping.base import DistanceField
+from uavexp.mapping.blocks import EDGE, Blocks, blocks_of, write_voxels
 from uavexp.mapping.frustum import column_depths, frustum_box
 from uavexp.mapping.occupancy import OccupancyMap, Rule, enlist, judge, keeps_free
 from uavexp.mapping.parameters import MapParameters
+from uavexp.mapping.rays import integrate_rays
 from uavexp.o3d import open3d
-from uavexp.types import Bool, DepthScan, Float, Float32, Int32, MapUpdate, UInt8
+from uavexp.scene import Scene
+from uavexp.types import Bool, DepthScan, Float, Float32, Int32, MapUpdate, RayScan, Scan, UInt8
 
-_EDGE = 8  # voxels along a block
-_BLOCK = _EDGE**3
 _LARGEST_START = 20_000  # blocks that are allocated at once; more are added when needed
 _DEVICE = re.compile(r"CPU:0|CUDA:\d+")
 
@@ -61,11 +64,11 @@ def _blocks_in_view(
     fx, fy, cx, cy = intrinsics
     width = farthest.shape[0]
     box = frustum_box(intrinsics, height, width, range_m, rotation, corner)
-    edge = _EDGE * voxel_m
+    edge = EDGE * voxel_m
     first, last = np.empty(3, np.int64), np.empty(3, np.int64)
     for axis in range(3):
         first[axis] = max(int(np.floor(box[0, axis] / edge)), 0)
-        last[axis] = min(int(np.floor(box[1, axis] / edge)), (shape[axis] - 1) // _EDGE)
+        last[axis] = min(int(np.floor(box[1, axis] / edge)), (shape[axis] - 1) // EDGE)
         if first[axis] > last[axis]:
             return np.empty((0, 3), np.int32)
     # inward normals of the four side planes, all through the camera
@@ -77,7 +80,7 @@ def _blocks_in_view(
             [0.0, -fy, height - 0.5 - cy],
         ]
     )
-    span = (_EDGE - 1) * voxel_m  # from a block's first voxel centre to its last
+    span = (EDGE - 1) * voxel_m  # from a block's first voxel centre to its last
     found = np.empty(
         ((last[0] - first[0] + 1) * (last[1] - first[1] + 1) * (last[2] - first[2] + 1), 3), np.int32
     )
@@ -148,14 +151,14 @@ def _take_over(
     nx, ny, nz = shape
     for n in range(blocks.shape[0]):
         new_d, new_w = fused[rows[n]], weights[rows[n]]
-        x0, y0, z0 = blocks[n, 0] * _EDGE, blocks[n, 1] * _EDGE, blocks[n, 2] * _EDGE
-        for x in range(x0, min(x0 + _EDGE, nx)):
-            for y in range(y0, min(y0 + _EDGE, ny)):
-                inner = (x - x0) + _EDGE * (y - y0)
+        x0, y0, z0 = blocks[n, 0] * EDGE, blocks[n, 1] * EDGE, blocks[n, 2] * EDGE
+        for x in range(x0, min(x0 + EDGE, nx)):
+            for y in range(y0, min(y0 + EDGE, ny)):
+                inner = (x - x0) + EDGE * (y - y0)
                 column = (x * ny + y) * nz
                 depth = axis_start + x * axis_step[0] + y * axis_step[1]
-                for z in range(z0, min(z0 + _EDGE, nz)):
-                    local = inner + _EDGE * _EDGE * (z - z0)
+                for z in range(z0, min(z0 + EDGE, nz)):
+                    local = inner + EDGE * EDGE * (z - z0)
                     at = column + z
                     had = np.int64(weight[at])
                     if new_w[local] <= had:
@@ -194,7 +197,7 @@ class VoxelBlockGrid(MapParameters):
             f"device must be CPU:0 or CUDA:<number>, got {self.device}",
         )
 
-    def reset(self, bounds_m: Float) -> None:
+    def reset(self, bounds_m: Float, scene: Scene) -> None:
         """Begin a trial with everything unknown inside `bounds_m` (2, 3).
 
         Raises:
@@ -203,14 +206,14 @@ class VoxelBlockGrid(MapParameters):
         """
         self._check_device()
         self._map = self.empty_map(bounds_m)
-        blocks = int(np.prod([-(-count // _EDGE) for count in self._map.shape]))
+        blocks = int(np.prod([-(-count // EDGE) for count in self._map.shape]))
         self._on = open3d.core.Device(self.device)
         self._grid = open3d.t.geometry.VoxelBlockGrid(
             attr_names=("tsdf", "weight"),
             attr_dtypes=(open3d.core.float32, open3d.core.float32),
             attr_channels=((1), (1)),
             voxel_size=self.voxel_size_m,
-            block_resolution=_EDGE,
+            block_resolution=EDGE,
             block_count=min(blocks, _LARGEST_START),
             device=self._on,
         )
@@ -219,9 +222,12 @@ class VoxelBlockGrid(MapParameters):
         """Declare a ball known free as far as it is unknown; measured surfaces override it."""
         self._live().mark_free(centre_m, radius_m)
 
-    def integrate(self, scan: DepthScan) -> None:
+    def integrate(self, scan: Scan) -> None:
         """Fuse one scan."""
         grid = self._live()
+        if isinstance(scan, RayScan):
+            self._hand_over(integrate_rays(scan, grid, self.rule()))
+            return
         intrinsics = np.array([*scan.focal_px, *scan.centre_px])
         corner = scan.camera_position_m - grid.origin_m - 0.5 * self.voxel_size_m
         blocks = _blocks_in_view(
@@ -233,7 +239,7 @@ class VoxelBlockGrid(MapParameters):
             return
         self._fuse(scan, blocks, corner)
         axis = scan.camera_rotation[:, 2]
-        with _Blocks(self._grid, blocks, self._on) as (rows, fused, weights):
+        with Blocks(self._grid, blocks, self._on) as (rows, fused, weights):
             grid.changed = _take_over(
                 blocks, rows, fused, weights, axis * self.voxel_size_m, -float(axis @ corner),
                 scan.max_range_m, grid.shape, self.rule(),
@@ -263,13 +269,23 @@ class VoxelBlockGrid(MapParameters):
                     "NVIDIA GPU and the package open3d in place of open3d-cpu (never both), or device=CPU:0"
                 )
 
+    def _hand_over(self, touched: Int32) -> None:
+        """Write voxels (N,) that were fused outside of Open3D into its blocks."""
+        grid = self._live()
+        blocks, local = blocks_of(touched, grid.shape)
+        if blocks.shape[0] == 0:
+            return
+        self._grid.hashmap().activate(open3d.core.Tensor(blocks, device=self._on))
+        with Blocks(self._grid, blocks, self._on) as (rows, fused, weights):
+            write_voxels(touched, local, rows, grid.tsdf_m, grid.weight, self.truncation_m, fused, weights)
+
     def _fuse(self, scan: DepthScan, blocks: Int32, corner: Float) -> None:
         """Let Open3D integrate the scan into `blocks`."""
         core = open3d.core
         height, width = scan.depth_m.shape
         depth = np.zeros((height + 1, width + 1, 1), np.float32)
         # farther than any voxel of a block in view, so that it makes free and never a surface
-        free = np.float32(scan.max_range_m + 2.0 * self.truncation_m + 2.0 * _EDGE * self.voxel_size_m)
+        free = np.float32(scan.max_range_m + 2.0 * self.truncation_m + 2.0 * EDGE * self.voxel_size_m)
         known: Bool = ~np.isnan(scan.depth_m)
         depth[:-1, :-1, 0] = np.where(known, np.minimum(scan.depth_m, free), np.float32(0.0))
         pose = np.eye(4)
@@ -287,28 +303,3 @@ class VoxelBlockGrid(MapParameters):
             depth_max=float(free) + 1.0,
             trunc_voxel_multiplier=self.truncation_m / self.voxel_size_m,
         )
-
-
-class _Blocks:
-    """The values of some blocks as arrays to read and write: in place on the CPU, copied for a GPU."""
-
-    def __init__(self, grid: Any, blocks: Int32, device: Any) -> None:
-        self._device = device
-        self._attributes = [grid.attribute(name) for name in ("tsdf", "weight")]
-        self._rows, _ = grid.hashmap().find(open3d.core.Tensor(blocks, device=device))
-        self._copies: list[Float32] = []
-
-    def __enter__(self) -> tuple[Int32, Float32, Float32]:
-        rows = self._rows.cpu().numpy().astype(np.int32)
-        if self._device.get_type() == open3d.core.Device.DeviceType.CPU:
-            fused, weights = (tensor.numpy().reshape(-1, _BLOCK) for tensor in self._attributes)
-            return rows, fused, weights
-        index = self._rows.to(open3d.core.int64)
-        self._copies = [tensor[index].cpu().numpy().copy() for tensor in self._attributes]
-        fused, weights = (copy.reshape(-1, _BLOCK) for copy in self._copies)
-        return np.arange(rows.shape[0], dtype=np.int32), fused, weights
-
-    def __exit__(self, *_: object) -> None:
-        index = self._rows.to(open3d.core.int64)
-        for tensor, copy in zip(self._attributes, self._copies, strict=False):
-            tensor[index] = open3d.core.Tensor(copy, device=self._device)

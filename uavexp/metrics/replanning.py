@@ -18,7 +18,7 @@ import numpy as np
 from uavexp.types import PlanStatus, Replan, TrialLog
 
 # counted by name; every other cause ("retry", "brake") is "other"
-CAUSES = ("map", "goal", "clock", "distance", "collision", "covered", "expired", "arrival")
+CAUSES = ("map", "goal", "clock", "distance", "collision", "covered", "expired", "arrival", "risk")
 
 
 def executed(log: TrialLog) -> tuple[Replan, ...]:

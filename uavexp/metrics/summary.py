@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from uavexp.metrics import clearance, path, plan, replanning, smoothness, tracking
+from uavexp.metrics import clearance, path, plan, replanning, smoothness, tracking, tracking_movers
 from uavexp.types import Outcome, TrialLog, World
 
 Metrics = dict[str, bool | int | float | str]
@@ -16,6 +16,7 @@ def evaluate(
     *,
     safety_threshold_m: float = 0.30,
     useful_change_m: float = 0.10,
+    near_miss_m: float = 0.50,
 ) -> Metrics:
     """Return every metric of a flight; recomputable from a stored log without flying.
 
@@ -25,6 +26,9 @@ def evaluate(
         safety_threshold_m: clearance under which time counts as unsafe, m ([ours]: MCR's mean
             smallest clearance in Chen et al. 2026 is 0.31 m).
         useful_change_m: departure from the old plan from which a replan was useful, m [ours].
+
+        near_miss_m: distance of the body's centre from a mover below which it is a near miss, m
+            ([ours]: the buffer delta of paper 2).
 
     Returns:
         One plain value per name, units in the names. NaN says that a figure does not exist
@@ -41,6 +45,7 @@ def evaluate(
         **plan.measures(log, world),
         **plan.costs(log),
         "seen_share": float(log.seen_share),
+        **tracking_movers.measures(log, near_miss_m),
     }
 
 

@@ -17,7 +17,13 @@ ladder makes obstacles dearer, the flight slower and the spline finer. When a mo
 defeats that, the vehicle is braked first and the rest planned from where it stands, with rungs
 that also tie the curve to the path; brake and flight are one trajectory.
 
-Left out: yaw; the cost per metre (c is per second, as in the paper); moving obstacles.
+Movers are obstacles at their predicted places, each at its own instant (`moving`): in the search
+where the vehicle would meet them, in the optimisation at the samples' instants, hard on the
+result. Without a plan that keeps `mover_margin_m`, one that passes closer is taken; without
+that either, the vehicle first stops or steps aside, whichever stays farthest from all of them,
+and goes on from there: merely stopping is no rescue from what does not look out.
+
+Left out: yaw; the cost per metre (c is per second, as in the paper).
 All budgets are iterations; the answer depends on the request and nothing else.
 """
 
@@ -30,15 +36,18 @@ import numpy as np
 
 from uavexp.errors import require, require_non_negative, require_positive
 from uavexp.geometry import GRAVITY_MPS2, evaluate, sample_times
+from uavexp.mapping.base import DistanceField
 from uavexp.planner.brake import braking_trajectory
-from uavexp.planner.optimise import CONTROL_POINTS, Settings, optimise, shortfall
+from uavexp.planner.escape import safest_stop
+from uavexp.planner.optimise import CONTROL_POINTS, Settings, moving_obstacles, optimise, shortfall
 from uavexp.planner.search import PathSearch
 from uavexp.planner.spline import join, spline_model, to_trajectory
-from uavexp.types import Limits, PlanRequest, PlanResult, PlanStatus
+from uavexp.types import Limits, PlanRequest, PlanResult, PlanStatus, Trajectory
 
 _MENDED_BY_BRAKING = (PlanStatus.NOT_CLEAR, PlanStatus.LIMITS, PlanStatus.SOLVER)
 _REST_MPS = 0.05  # a slower start counts as standing
 _BRAKE_CHECK_S = 0.02
+_CLOSER = 0.4  # share of the margin that a plan among movers may fall back on
 
 
 @dataclass(slots=True, kw_only=True)
@@ -58,6 +67,8 @@ class MinAcc:
     z_band_m: float = 0.3
     unknown: str = "optimistic"
     max_expansions: int = 300_000
+    mover_margin_m: float = 0.5
+    mover_horizon_s: float = 2.0
     _limits: Limits | None = field(default=None, init=False, repr=False)
     _settings: Settings | None = field(default=None, init=False, repr=False)
     _search: PathSearch | None = field(default=None, init=False, repr=False)
@@ -74,6 +85,8 @@ class MinAcc:
             end_speed_mps=self.end_speed_mps,
             path_clearance_weight=self.path_clearance_weight,
             z_band_m=self.z_band_m,
+            mover_margin_m=self.mover_margin_m,
+            mover_horizon_s=self.mover_horizon_s,
         )
         require(
             self.safe_clearance_m > self.min_clearance_m,
@@ -115,6 +128,9 @@ class MinAcc:
             max_speed=limits.max_speed_mps,
             max_acceleration=limits.max_acceleration_mps2,
             max_jerk=GRAVITY_MPS2 * limits.max_body_rate_radps,
+            body_radius=limits.body_radius_m,
+            mover_margin=self.mover_margin_m,
+            mover_horizon=self.mover_horizon_s,
         )
         self._search = PathSearch(
             min_clearance_m=self.min_clearance_m,
@@ -127,19 +143,45 @@ class MinAcc:
 
     def plan(self, request: PlanRequest) -> PlanResult:
         """Return a trajectory or the reason why there is none (`Planner.plan`)."""
-        if self._settings is None or self._search is None:
+        if self._settings is None or self._search is None or self._limits is None:
             raise RuntimeError("plan() needs reset() first")
-        result = self._attempt(request, self._settings, self._search)
+        settings, search, limits = self._settings, self._search, self._limits
+        result = self._attempt(request, settings, search)
+        if result.trajectory is None and len(moving_obstacles(request, settings)):
+            return self._among_movers(request, settings, search, limits, result)
         speed = float(np.linalg.norm(request.velocity_mps))
         if result.status in _MENDED_BY_BRAKING and speed > _REST_MPS:
-            return self._brake_first(request, result)
+            brake = braking_trajectory(
+                request.time_s, request.position_m, request.velocity_mps, request.acceleration_mps2, limits
+            )
+            return self._stop_first(request, brake, settings, search, result, "brakes first")
         return result
+
+    def _among_movers(
+        self,
+        request: PlanRequest,
+        settings: Settings,
+        search: PathSearch,
+        limits: Limits,
+        failed: PlanResult,
+    ) -> PlanResult:
+        """Pass closer; else stop or step aside, and go on from there."""
+        closer = settings._replace(mover_margin=_CLOSER * settings.mover_margin)
+        result = _summed(failed, self._attempt(request, closer, search), "passes movers closely")
+        if result.trajectory is not None:
+            return result
+        stop, aside = safest_stop(request, settings, limits)
+        reason = "steps aside first" if aside else "brakes first"
+        return self._stop_first(request, stop, closer, search, result, reason)
 
     def _attempt(self, request: PlanRequest, settings: Settings, search: PathSearch) -> PlanResult:
         """Search and optimise once."""
         began = time.perf_counter()
         goal_m = request.goal.position_m
-        found = search.find(request.field, request.position_m, goal_m, request.flight_bounds_m)
+        ends = (request.position_m, goal_m, request.flight_bounds_m)
+        found = search.find(_field_with_movers(request, settings), *ends)
+        if found.status is not PlanStatus.OK and len(request.tracks):
+            found = search.find(request.field, *ends)  # in time there may be a way: the check decides
         searched = time.perf_counter()
         if found.status is not PlanStatus.OK:
             return PlanResult(
@@ -163,34 +205,55 @@ class MinAcc:
             wall_optimise_s=time.perf_counter() - searched,
         )
 
-    def _brake_first(self, request: PlanRequest, failed: PlanResult) -> PlanResult:
+    def _stop_first(
+        self,
+        request: PlanRequest,
+        stop: Trajectory,
+        settings: Settings,
+        search: PathSearch,
+        failed: PlanResult,
+        reason: str,
+    ) -> PlanResult:
         """Stop, then fly from there; the failure of the direct attempt when that fails, too."""
-        settings, search, limits = self._settings, self._search, self._limits
-        if settings is None or search is None or limits is None:
-            raise RuntimeError("plan() needs reset() first")
-        brake = braking_trajectory(
-            request.time_s, request.position_m, request.velocity_mps, request.acceleration_mps2, limits
-        )
-        way = evaluate(brake, sample_times(brake, brake.start_s, _BRAKE_CHECK_S))[0]
+        way = evaluate(stop, sample_times(stop, stop.start_s, _BRAKE_CHECK_S))[0]
         if shortfall(request, settings, way):
             return failed
         standing = replace(
             request,
-            time_s=brake.end_s,
+            time_s=stop.end_s,
             position_m=way[-1],
             velocity_mps=np.zeros(3),
             acceleration_mps2=np.zeros(3),
         )
         onward = self._attempt(standing, settings, search)
-        spent = replace(
-            failed,
-            iterations=failed.iterations + onward.iterations,
-            expansions=failed.expansions + onward.expansions,
-            wall_search_s=failed.wall_search_s + onward.wall_search_s,
-            wall_optimise_s=failed.wall_optimise_s + onward.wall_optimise_s,
-        )
         if onward.trajectory is None:
-            return spent
-        joined = join(brake, onward.trajectory)
-        path = np.concatenate([request.position_m[None], onward.path_m])
-        return replace(spent, status=PlanStatus.OK, trajectory=joined, path_m=path, reason="brakes first")
+            return _summed(failed, onward, reason)
+        path_m = np.concatenate([request.position_m[None], onward.path_m])
+        joined = replace(onward, trajectory=join(stop, onward.trajectory), path_m=path_m)
+        return _summed(failed, joined, reason)
+
+
+def _summed(failed: PlanResult, then: PlanResult, reason: str) -> PlanResult:
+    """The second answer, for this reason, or the first failure when it is none; with the work of both."""
+    answer = failed if then.trajectory is None else replace(then, reason=reason)
+    return replace(
+        answer,
+        iterations=failed.iterations + then.iterations,
+        expansions=failed.expansions + then.expansions,
+        wall_search_s=failed.wall_search_s + then.wall_search_s,
+        wall_optimise_s=failed.wall_optimise_s + then.wall_optimise_s,
+    )
+
+
+def _field_with_movers(request: PlanRequest, settings: Settings) -> DistanceField:
+    """The request's map, with the movers where the vehicle would meet them if there are any."""
+    moving = moving_obstacles(request, settings)
+    if not len(moving):
+        return request.field
+    return moving.stamped(
+        request,
+        speed_mps=settings.max_speed / settings.duration_margin,
+        acceleration_mps2=settings.max_acceleration,
+        least_m=settings.min_clearance + 0.5 * request.field.voxel_size_m,
+        safe_m=settings.safe_clearance,
+    )

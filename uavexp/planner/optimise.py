@@ -9,6 +9,7 @@ import daqp
 import numpy as np
 
 from uavexp.mapping.base import DistanceField
+from uavexp.planner.moving import MovingObstacles
 from uavexp.planner.scp import limit_rows, line_search, quadratic_model
 from uavexp.planner.spline import (
     SAMPLES,
@@ -20,7 +21,7 @@ from uavexp.planner.spline import (
     spline_model,
 )
 from uavexp.planner.timing import STEP_M, place_by_time, resample, smooth, time_profile
-from uavexp.types import Float, PlanRequest, PlanStatus
+from uavexp.types import Float, PlanRequest, PlanStatus, Tracks
 
 CONTROL_POINTS = range(10, 41, 2)  # the numbers that are used
 _SMOOTHING_ROUNDS = 10  # takes the staircase out of a voxel path
@@ -73,6 +74,9 @@ class Settings(NamedTuple):
     max_speed: float
     max_acceleration: float
     max_jerk: float  # of the stop that follows a moving end
+    body_radius: float = 0.0
+    mover_margin: float = 0.0  # kept from predicted movers beyond the body's radius
+    mover_horizon: float = 0.0  # so long a prediction counts
 
 
 class Problem(NamedTuple):
@@ -84,6 +88,7 @@ class Problem(NamedTuple):
     end: Float  # (3, 3)
     field: DistanceField
     bounds: Float  # (2, 3)
+    movers: Float  # (B, COLUMNS) table of `moving`
 
 
 class Curve(NamedTuple):
@@ -145,7 +150,8 @@ def _prepare(request: PlanRequest, path_m: Float, settings: Settings) -> Problem
     heights = (start[0, 2], end[0, 2])
     bounds[0, 2] = max(bounds[0, 2], min(heights) - settings.z_band)
     bounds[1, 2] = min(bounds[1, 2], max(heights) + settings.z_band)
-    problem = Problem(path, raw, start, end, request.field, bounds)
+    movers = moving_obstacles(request, settings).table(request.time_s)
+    problem = Problem(path, raw, start, end, request.field, bounds, movers)
     if not request.goal.is_target:
         end[1] = _end_velocity(problem, settings)
     return problem
@@ -189,7 +195,8 @@ class _Shaper:
         count = min(max(count, CONTROL_POINTS.start), CONTROL_POINTS[-1])
         self.model: SplineModel = spline_model(count + count % 2)
         hard = settings.min_clearance + _HARD_ABOVE_VOXELS * problem.field.voxel_size_m
-        self.weights = np.array([settings.obstacle_weight * rung.weight, settings.safe_clearance, hard])
+        weight, least = settings.obstacle_weight * rung.weight, settings.min_clearance
+        self.weights = np.array([weight, settings.safe_clearance, hard, least])
         self.limits = _QP_SHARE * np.array([settings.max_speed, settings.max_acceleration])
         samples = len(self.model.position)
         self.tether = np.zeros((samples, 3))
@@ -240,7 +247,7 @@ class _Shaper:
         for _ in range(rounds):
             self._set_tether(control)
             grid = (field.distance, field.origin_m, field.voxel_size_m)
-            pull = (self.weights, self.tether, self.tether_weight, self.limits)
+            pull = (self.weights, self.tether, self.tether_weight, self.limits, self.problem.movers)
             local = (h, model.energy, model.position, *grid, *pull)
             hessian, gradient = quadratic_model(control, *local)
             rows, sides = limit_rows(control, h, self.limits, self.problem.bounds)
@@ -299,7 +306,24 @@ def curve_shortfall(request: PlanRequest, settings: Settings, curve: Curve) -> s
     """Say where a curve is not clear, checked every half voxel; empty when it is."""
     longest = float(np.linalg.norm(np.diff(curve.control, axis=0), axis=1).max())
     per_segment = max(math.ceil(longest / (0.5 * request.field.voxel_size_m)), 1)
-    return shortfall(request, settings, sample_spline(curve.control, per_segment))
+    points = sample_spline(curve.control, per_segment)
+    times = request.time_s + np.arange(len(points), dtype=np.float64) * (curve.h / per_segment)
+    return shortfall(request, settings, points) or mover_shortfall(request, settings, points, times)
+
+
+def moving_obstacles(request: PlanRequest, settings: Settings) -> MovingObstacles:
+    """The believed movers with what these settings keep from them; none when they do not count at all."""
+    return MovingObstacles(
+        tracks=request.tracks if settings.mover_horizon > 0.0 else Tracks.none(request.time_s),
+        body_radius_m=settings.body_radius,
+        margin_m=settings.mover_margin,
+        horizon_s=settings.mover_horizon,
+    )
+
+
+def mover_shortfall(request: PlanRequest, settings: Settings, points: Float, times: Float) -> str:
+    """Say where a curve through points (P, 3) at times (P,) is too near to a mover; empty when it is not."""
+    return moving_obstacles(request, settings).shortfall(points, times, settings.max_acceleration)
 
 
 def shortfall(request: PlanRequest, settings: Settings, points: Float) -> str:

@@ -1,7 +1,8 @@
 """One step of the sequential convex programme of `min_acc`: local model, QP data, merit.
 
 Merit: ∫ ‖r''‖² + λ c(r) dt + μ Σ ‖r - p‖² over the samples that are tethered to path points p.
-The obstacle cost is c(d) = (1 - d/safe)₊² + 10 ((hard - d)/safe)₊², d the mapped distance.
+The obstacle cost is c(d) = (1 - d/safe)₊² + 10 ((hard - d)/safe)₊², d the mapped distance, or what
+is left of the distance to a mover at the sample's instant (`moving`) if that is less.
 It has a kink on the medial axis of a gap, where Gauss-Newton would jump from wall to wall;
 so each sample takes slope and (non-negative) curvature of c from differences over a voxel,
 along the curve, across it, and up. The model of every step is convex.
@@ -13,6 +14,7 @@ import numba as nb
 import numpy as np
 
 from uavexp.mapping.field import value_and_gradient
+from uavexp.planner.moving import clearance_after
 from uavexp.planner.spline import SAMPLES
 from uavexp.types import Float, Float32
 
@@ -59,10 +61,12 @@ def merit(
     tether_m: Float,
     tether_weight: Float,
     limits: Float,
+    movers: Float,
 ) -> float:
     """Value of the merit at control points (N, 3).
 
-    `weights` are λ, safe and hard distance; `limits` are those of speed and acceleration.
+    `weights` are λ, safe, hard and least distance; `limits` are those of speed and acceleration;
+    `movers` is the table of `moving`, its times counted from the start of the curve.
     """
     bent = energy @ control
     total = (control * bent).sum() / h**3
@@ -75,12 +79,27 @@ def merit(
         total += _EXCESS_WEIGHT * max(np.sqrt(strong) / (h * h * limits[1]) - 1.0, 0.0)
     points = _samples(control, position)
     d, _ = value_and_gradient(distance, origin_m, voxel_m, points)
+    _heed(movers, points, 1, h, weights[3], d)
     share = h / SAMPLES
     for k in range(points.shape[0]):
         total += weights[0] * share * _cost(d[k], weights[1], weights[2])
         if tether_weight[k] > 0.0:
             total += tether_weight[k] * share * ((points[k] - tether_m[k]) ** 2).sum()
     return float(total)
+
+
+@nb.njit(cache=True)
+def _heed(movers: Float, points: Float, each: int, h: float, least_m: float, distance_m: Float) -> None:
+    """Lower the distances of points, `each` of a sample, that are near a mover at the sample's instant.
+
+    To be just clear of a mover is worth as much as to have the least distance from what is fixed.
+    """
+    if movers.shape[0] == 0:
+        return
+    for n in range(points.shape[0]):
+        ahead_s = (n // each + 0.5) * h / SAMPLES
+        clearance = clearance_after(movers, points[n, 0], points[n, 1], points[n, 2], ahead_s)
+        distance_m[n] = min(distance_m[n], clearance + least_m)
 
 
 @nb.njit(cache=True)
@@ -152,6 +171,7 @@ def quadratic_model(
     tether_m: Float,
     tether_weight: Float,
     limits: Float,
+    movers: Float,
 ) -> tuple[Float, Float]:
     """Hessian (3n, 3n) and gradient (3n,) of the merit over the n = N - 6 free control points.
 
@@ -175,6 +195,7 @@ def quadratic_model(
             around[7 * k + 1 + 2 * e] = points[k] + voxel_m * frames[k, e]
             around[7 * k + 2 + 2 * e] = points[k] - voxel_m * frames[k, e]
     d, _ = value_and_gradient(distance, origin_m, voxel_m, around)
+    _heed(movers, around, 7, h, weights[3], d)
     slope, bend = np.empty(3), np.empty((3, 3))
     for k in range(count):
         slope[:], bend[:] = 0.0, 0.0
@@ -274,6 +295,7 @@ def line_search(
     tether_m: Float,
     tether_weight: Float,
     limits: Float,
+    movers: Float,
 ) -> tuple[Float, float]:
     """First of a few shares of a QP's step (n, 3) that lowers the merit, and by what share of it.
 
@@ -281,7 +303,7 @@ def line_search(
     """
     last = control.shape[0] - 3
     grid = (distance, origin_m, voxel_m)
-    pull = (weights, tether_m, tether_weight, limits)
+    pull = (weights, tether_m, tether_weight, limits, movers)
     present = merit(control, h, energy, position, *grid, *pull)
     share = 1.0
     for _ in range(4):

@@ -8,7 +8,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from uavexp.errors import UavexpError
+from uavexp.errors import UavexpError, one_line
 
 _USAGE = """usage: python -m uavexp.report DIR [DIR ...]
 
@@ -19,7 +19,10 @@ _PATIENCE_S = 2.0  # nothing is said about work that is done sooner
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Make the report of every folder named and return the exit code: 0, 2 bad input, 130 interrupted."""
+    """Make the report of every folder named and return the exit code.
+
+    0; 1 the disk was full; 2 bad input; 130 interrupted.
+    """
     os.environ["MPLBACKEND"] = "Agg"
     names = list(sys.argv[1:] if arguments is None else arguments)
     if not names or {"-h", "--help"} & set(names):
@@ -29,8 +32,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for name in names:
             _report(Path(name))
     except UavexpError as error:
-        sys.stderr.write(f"error: {' '.join(str(error).split())}\n")
-        return 2
+        sys.stderr.write(f"error: {one_line(error)}\n")
+        return error.exit_code
     except KeyboardInterrupt:
         sys.stderr.write("interrupted\n")
         return 130
@@ -42,12 +45,15 @@ def _report(folder: Path) -> None:
 
     begin_s = time.monotonic()
 
+    def tell(line: str) -> None:
+        sys.stdout.write(f"{folder}: {line}\n")
+        sys.stdout.flush()
+
     def say(line: str) -> None:
         if time.monotonic() - begin_s > _PATIENCE_S:
-            sys.stdout.write(f"{folder}: {line}\n")
-            sys.stdout.flush()
+            tell(line)
 
-    for path in make_report(folder, say):
+    for path in make_report(folder, say, warn=tell):
         sys.stdout.write(f"{path}\n")
 
 

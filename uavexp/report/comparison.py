@@ -30,6 +30,7 @@ class Metric:
     digits: int  # shown
     better: int = 0  # 1: more is better, -1: less, 0: neither
     scale: float = 1.0  # shown value over stored value
+    is_count: bool = False  # of events in a flight: bounded also where none occurred
     # a path cut short by failure is not a shorter path: compared where both arms succeeded, too
     needs_arrival: bool = False
 
@@ -46,7 +47,7 @@ class Estimate:
     n: int  # trials for which it exists
     mean: float
     sd: float  # over trials; of a rate: over the scenes' rates; NaN with fewer than two
-    interval: Interval
+    interval: Interval  # NaN where there is none
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -184,6 +185,8 @@ def _interval(panel: Panel, metric: Metric, arm: str) -> Interval:
     if metric.is_rate:
         low, high = statistics.rate_interval(panel.success(arm)[exists], cluster)
         return Interval(metric.scale * low, metric.scale * high)
+    if metric.is_count and not panel.values(metric, arm)[exists].any():
+        return statistics.no_event_interval(int(exists.sum()))
     samples = panel.samples[metric.column][:, column]
     return interval_of(metric.scale * samples, statistics.units_of(cluster))
 

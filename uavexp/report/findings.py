@@ -12,12 +12,15 @@ from uavexp.report import cells
 from uavexp.report.comparison import FEWEST_SCENES, SCENE, Metric, Panel, estimate, panel_of
 from uavexp.report.parts import Claim, Table
 from uavexp.study import Study
+from uavexp.table import pooled_versions
 
 OK = "ok"  # status of a trial that ran to its end
 
 INTERVALS = (
     "In brackets 95 % intervals. Rates: Wilson's, with the effective number of trials in scenes. Means: "
-    "bootstrap, scenes resampled, then seeds within them, percentiles widened for the number of scenes."
+    "bootstrap, scenes resampled, then seeds within them, percentiles widened for the number of scenes. "
+    "Where all values are equal there is nothing to resample and no interval stands; a count that was zero "
+    "in every flight has the exact Poisson bound instead, 3.7 / n."
 )
 FAILED = (
     "n counts every trial. One that did not run to its end (killed, out of time or memory) is a failure in "
@@ -80,6 +83,9 @@ def circumstances(study: Study, panel: Panel) -> tuple[str, ...]:
     if "p_planner_unknown" in trials:
         ways = sorted(trials["p_planner_unknown"].dropna().astype(str).unique())
         notes.append(f"Unknown space in plans: {', '.join(ways)}.")
+    marks = [name for name in ("code", "lock") if name in trials]
+    if marks and (pooled := pooled_versions(trials[marks].fillna("").itertuples(index=False, name=None))):
+        notes.append(pooled)
     if "status" in trials and (failed := int((trials["status"] != OK).sum())):
         notes.append(f"{failed} trials did not run to their end.")
     return tuple(notes)

@@ -35,10 +35,12 @@ Json = dict[str, Any]
 
 
 def section(study: Study) -> str:
-    """The part of the page with the flights of one world; empty when no log is stored."""
+    """The part of the page with the flights of one world.
+
+    Raises:
+        RecordError: no such flights are stored, or they are damaged.
+    """
     shared = _shown(study)
-    if shared is None:
-        return ""
     script = plotly_file()
     if script is None:
         return (
@@ -62,11 +64,11 @@ def section(study: Study) -> str:
 {asset.read_text(encoding="utf-8")}</script>"""
 
 
-def _shown(study: Study) -> flown.SharedWorld | None:
+def _shown(study: Study) -> flown.SharedWorld:
     """The world of figure 3."""
     flights = flown.flights_of(study)
     scenes, arms = flown.scenes_of(study, flights), flown.three_arms(study)
-    return next(flown.shared_worlds(study, flown.stored(study, flights), arms, scenes[:1]), None)
+    return flown.shared_world(study, flown.stored(study, flights), arms, scenes[0])
 
 
 def _caption(shared: flown.SharedWorld) -> str:

@@ -10,10 +10,11 @@ from typing import Any
 
 import pandas as pd
 
+from uavexp.errors import RecordError
 from uavexp.records import PICTURE, write_text
 from uavexp.report import flight3d
 from uavexp.report.comparison import SCENE
-from uavexp.report.figures import flown
+from uavexp.report.figures import flown, missing
 from uavexp.report.findings import OK, circumstances, study_panel
 from uavexp.report.parts import Claim, Drawing, Table, Verdict
 from uavexp.report.shown import RATE
@@ -31,6 +32,7 @@ def write_html(
     claims: Sequence[Claim],
     drawings: Sequence[tuple[Drawing, Path]],
     path: Path,
+    left_out: Sequence[str] = (),
 ) -> None:
     """Write the page of a report; the same study gives the same bytes.
 
@@ -40,15 +42,22 @@ def write_html(
         claims: with their verdicts.
         drawings: finished figures with their PNG files.
         path: of the page. Pictures of trials and pdf figures are linked relative to the study.
+        left_out: sentences: which figure is left out, and why.
 
     Raises:
         RecordError: it cannot be written.
     """
+    try:
+        flight = flight3d.section(study)
+    except RecordError as error:
+        flight, left_out = "", [*left_out, missing("a flight in 3D", error, study)]
     sections = {
         "Result": "\n".join(map(_table, tables[:1])),
         "Verdicts": _claims(claims) if claims else "",
-        "Figures": "\n".join(_figure(drawing, png) for drawing, png in drawings),
-        "A flight in 3D": flight3d.section(study),
+        "Figures": "\n".join(
+            [*(_figure(drawing, png) for drawing, png in drawings), *(_paragraph(line) for line in left_out)]
+        ),
+        "A flight in 3D": flight,
         "Further tables": "\n".join(map(_table, tables[1:])),
         "Failed trials": _failed(study),
     }
@@ -91,6 +100,10 @@ def _page(study: Study, sections: Mapping[str, str]) -> str:
 def asset(name: str) -> str:
     """A file of the page that stands beside this module."""
     return (Path(__file__).with_name("assets") / name).read_text(encoding="utf-8")
+
+
+def _paragraph(text: str) -> str:
+    return f"<p>{escape(text)}</p>"
 
 
 def _anchor(name: str) -> str:
@@ -184,7 +197,8 @@ def _failed(study: Study) -> str:
     rest = len(failed) - MOST_FAILED
     more = f" The first {MOST_FAILED} are shown, {rest} more are in {TABLE}." if rest > 0 else ""
     return (
-        f"<p>{len(failed)} of {len(flights)} trials did not reach their target without contact.{more}</p>\n"
+        f"<p>{len(failed)} of {len(flights)} trials did not reach their target without contact.{more} "
+        "Where no picture is kept, the command makes it.</p>\n"
         '<div class="wide tall"><table><thead><tr><th>arm</th><th>scene</th><th>seed</th><th>outcome</th>'
         "<th>contacts</th><th>picture</th><th>command that repeats it</th></tr></thead>\n"
         f"<tbody>\n{rows}\n</tbody></table></div>"
@@ -195,7 +209,7 @@ def _failed_row(study: Study, row: Mapping[Any, Any]) -> str:
     folder = study.folder / TRIALS / str(row["trial"])
     command = row.get("wall_command") or read_wall(folder).get("command", "")
     there = (folder / PICTURE).is_file()
-    link = f'<a href="{TRIALS}/{escape(str(row["trial"]))}/{PICTURE}">picture</a>' if there else "–"
+    link = f'<a href="{TRIALS}/{escape(str(row["trial"]))}/{PICTURE}">picture</a>' if there else "not kept"
     cells = (
         escape(str(row[flown.ARM])),
         escape(str(row[SCENE])),

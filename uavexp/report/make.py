@@ -1,12 +1,13 @@
 """A report from a study folder: tables, figures, verdicts and a page; nothing is flown.
 
-    tables/NAME.{csv,md,tex}  figures/NAME.{png,pdf}  claims.{csv,md}  report.html
+    tables/NAME.{csv,md,tex}  figures/NAME.{png,pdf}  claims.{csv,md}  report.html  .report (their names)
 
 The same trials give the same bytes.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import IO, Any
@@ -21,6 +22,8 @@ from uavexp.table import REPLANS, TABLE
 
 PAGE, CLAIMS = "report.html", "claims"
 TABLES, FIGURES = "tables", "figures"
+MANIFEST = ".report"  # names of the files that a report made
+_OWN = re.compile(rf"{CLAIMS}\.(csv|md)|{TABLES}/\w+\.(csv|md|tex)|{FIGURES}/\w+\.(png|pdf)")
 DPI = 200
 # no clock, no version of a library: the same figure, the same bytes
 _METADATA: dict[str, dict[str, Any]] = {
@@ -40,12 +43,13 @@ _KINDS: dict[str, Callable[[Study], Findings]] = {
 Say = Callable[[str], None]
 
 
-def make_report(folder: Path, say: Say = lambda line: None) -> list[Path]:
-    """Write tables, figures, verdicts and the page of a study.
+def make_report(folder: Path, say: Say = lambda line: None, warn: Say | None = None) -> list[Path]:
+    """Write tables, figures, verdicts and the page of a study; files of its report before this go.
 
     Args:
         folder: of the study.
         say: told what is being done.
+        warn: told what is left out, and why; by default `say` is.
 
     Returns:
         The files written, the page last.
@@ -59,11 +63,24 @@ def make_report(folder: Path, say: Say = lambda line: None) -> list[Path]:
         raise RecordError(f"{folder} holds no trial yet")
     say(f"{len(study.trials)} trials: tables")
     found = findings(study)
-    return [
+    files = [
         *_write_tables(found, folder),
         *_write_claims(found, folder),
-        *_write_figures_and_page(study, found, say),
+        *_write_figures_and_page(study, found, say, warn or say),
     ]
+    _remove_stale(folder, files)
+    return files
+
+
+def _remove_stale(folder: Path, files: Iterable[Path]) -> None:
+    """Remove what an earlier report of this folder made and this one did not; nothing else."""
+    made = {file.relative_to(folder).as_posix() for file in files}
+    manifest = folder / MANIFEST
+    before = manifest.read_text(encoding="utf-8").splitlines() if manifest.is_file() else []
+    for name in before:
+        if name not in made and _OWN.fullmatch(name):
+            (folder / name).unlink(missing_ok=True)
+    write_text(manifest, "".join(f"{name}\n" for name in sorted(made)))
 
 
 def findings(study: Study) -> Findings:
@@ -128,18 +145,21 @@ def _write(path: Path, text: str) -> Path:
     return path
 
 
-def _write_figures_and_page(study: Study, found: Findings, say: Say) -> Iterator[Path]:
+def _write_figures_and_page(study: Study, found: Findings, say: Say, warn: Say) -> Iterator[Path]:
     from uavexp.report.figures import drawings_of
     from uavexp.report.html import write_html
 
     _make_folder(study.folder / FIGURES)
     drawn: list[tuple[Drawing, Path]] = []
-    for drawing in _told(drawings_of(study), say):
+    left_out: list[str] = []
+    for drawing in _told(drawings_of(study, left_out.append), say):
         png, pdf = _write_figure(drawing, study.folder / FIGURES)
         drawn.append((drawing, png))
         yield from (png, pdf)
     say("page")
-    write_html(study, found.tables, found.claims, drawn, study.folder / PAGE)
+    for line in left_out:
+        warn(line)
+    write_html(study, found.tables, found.claims, drawn, study.folder / PAGE, left_out)
     yield study.folder / PAGE
 
 

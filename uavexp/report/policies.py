@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from uavexp.report import shown
-from uavexp.report.comparison import Metric
 from uavexp.report.findings import Findings, arms_table, circumstances, study_panel, values_table
 from uavexp.report.paired import comparisons_table, paired_tests
 from uavexp.study import Study
@@ -26,7 +25,7 @@ REPLANNING = (
     shown.NEAR_CHANGE,
     shown.BLOCKED_DELAY,
     shown.BLOCKED_UNANSWERED,
-    *(Metric(column=column, label=label, digits=1) for column, label in shown.CAUSES.items()),
+    *shown.CAUSE_METRICS,
 )
 _COMPARED = (
     shown.RATE,
@@ -41,7 +40,7 @@ _COMPARED = (
 _USEFUL = (
     "A replan was useful when the new path departs from the old one by more than 0.1 m, else wasted. "
     "Delay: from the first map update on which the path flown was blocked to the next request; mean of the "
-    "answered ones."
+    "answered ones; of each replan: column delay_s of replans.parquet."
 )
 
 

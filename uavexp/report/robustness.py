@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import pandas as pd
 
 from uavexp.report import cells, shown
-from uavexp.report.comparison import Metric, Panel, compare, estimate, pairs_of, panel_of
+from uavexp.report.comparison import (
+    FEWEST_SCENES,
+    Difference,
+    Metric,
+    Panel,
+    compare,
+    estimate,
+    pairs_of,
+    panel_of,
+)
 from uavexp.report.findings import (
     FAILED,
     INTERVALS,
@@ -27,8 +37,10 @@ from uavexp.study import Study
 
 ARM = "arm"
 NOISE, LATENCY, DRIFT = "noise", "latency", "drift"
+SMALL_NOISE, MODERATE_LATENCY, SEVERE_DRIFT = "small_noise", "moderate_latency", "severe_drift"
+_JUDGED = {SMALL_NOISE: NOISE, MODERATE_LATENCY: LATENCY, SEVERE_DRIFT: DRIFT}  # settings: the level judged
 FALSE_TRIGGERS = Metric(column="false_triggers_per_min", label="False triggers [1/min]", digits=2, better=-1)
-MAP_REPLANS = Metric(column="replans_map", label="Replans, cause map", digits=1)
+MAP_REPLANS = Metric(column="replans_map", label="Replans, cause map", digits=1, is_count=True)
 METRICS = (
     shown.RATE,
     shown.CONTACTS,
@@ -41,25 +53,20 @@ METRICS = (
 USEFUL_CHANGE_M = 0.10  # m; a replan that departs less from the old path was wasted (`metrics.summary`)
 _FALSE = "False trigger: a replan for a change of the map that moved the path by less than 0.1 m."
 _NONE = (
-    "After the semicolon: level minus the first one of its axis (none) in the same worlds, with the p value "
-    "of sign flips of whole scenes, not corrected. The other axes are at their first level."
+    "After the semicolon: level minus the undisturbed one of its axis in the same worlds, with the p value "
+    "of sign flips of whole scenes, not corrected. The other axes are undisturbed."
 )
-
 
 _TUNED_FOR = (shown.RATE, shown.CLEARANCE, FALSE_TRIGGERS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Levels:
-    """One disturbance at each of its levels, every other one at its first."""
+    """One disturbance at each of its levels, every other one absent."""
 
     axis: str
-    panel: Panel  # a column per level, the undisturbed one first
-
-    @property
-    def none(self) -> str:
-        """The undisturbed level."""
-        return self.panel.arms[0]
+    none: str  # the undisturbed level
+    panel: Panel  # a column per level, the undisturbed one among them
 
 
 def findings(study: Study) -> Findings:
@@ -97,13 +104,24 @@ def with_false_triggers(trials: pd.DataFrame, replans: pd.DataFrame) -> pd.DataF
 def _levels(study: Study, trials: pd.DataFrame, axis: str) -> Levels | None:
     """One axis by itself, flown by the primary arm; None without its undisturbed level."""
     alone = pd.Series(True, index=trials.index)
-    for other, values in arm_axes(study).items():
-        if other != axis:
-            alone &= trials[other].astype(str) == (_primary(study) if other == ARM else values[0])
+    for other in arm_axes(study).keys() - {axis}:
+        alone &= trials[other].astype(str) == (_primary(study) if other == ARM else _none(study, other))
     arms = arms_flown(trials[alone], {axis: study.axes[axis]})
-    if not arms or arms[0] != study.axes[axis][0]:
+    none = _none(study, axis)
+    if none not in arms:
         return None
-    return Levels(axis=axis, panel=panel_of(trials[alone], (axis,), arms, METRICS))
+    return Levels(axis=axis, none=none, panel=panel_of(trials[alone], (axis,), arms, METRICS))
+
+
+def _none(study: Study, axis: str) -> str:
+    """The level of an axis at which it disturbs nothing (`settings.none`; by default the first)."""
+    return str(study.settings.get("none", {}).get(axis, study.axes[axis][0]))
+
+
+def _level(study: Study, name: str, otherwise: int) -> str:
+    """The level that a claim is about (`settings`; by default that place of its axis)."""
+    axis = _JUDGED[name]
+    return str(study.settings.get(name, study.axes[axis][otherwise]))
 
 
 def _levels_table(levels: Sequence[Levels], notes: Sequence[str]) -> Table:
@@ -137,29 +155,28 @@ def _claims(study: Study, levels: dict[str, Levels]) -> Iterator[Claim]:
         FALSE_TRIGGERS.column: float(study.settings.get("false_triggers_per_min", 1.0)),
         shown.RATE.column: float(study.settings.get("success_percent", 5.0)),
     }
-    if NOISE in levels and len(levels[NOISE].panel.arms) > 1:
-        yield _no_worse(
-            levels[NOISE],
-            FALSE_TRIGGERS,
-            margins[FALSE_TRIGGERS.column],
-            "Small sensor noise ({level}) does not fire the trigger",
-        )
-    if LATENCY in levels and len(levels[LATENCY].panel.arms) > 1:
-        yield _no_worse(
-            levels[LATENCY],
-            shown.RATE,
-            margins[shown.RATE.column],
-            "Moderate latency ({level}) does not destabilise",
-        )
-    if DRIFT in levels and len(levels[DRIFT].panel.arms) > 1:
-        yield _degrades(levels[DRIFT])
+    for name, metric, otherwise, statement in (
+        (SMALL_NOISE, FALSE_TRIGGERS, 1, "Small sensor noise ({level}) does not fire the trigger"),
+        (MODERATE_LATENCY, shown.RATE, 1, "Moderate latency ({level}) does not destabilise"),
+    ):
+        if item := _disturbed(study, levels, name, otherwise):
+            yield _no_worse(item, _level(study, name, otherwise), metric, margins[metric.column], statement)
+    if item := _disturbed(study, levels, SEVERE_DRIFT, -1):
+        yield _degrades(item, _level(study, SEVERE_DRIFT, -1))
 
 
-def _no_worse(item: Levels, metric: Metric, margin: float, statement: str) -> Claim:
-    """The first disturbed level against none: worse by less than a margin, worse, or undecided."""
-    level = item.panel.arms[1]
+def _disturbed(study: Study, levels: Mapping[str, Levels], name: str, otherwise: int) -> Levels | None:
+    """The axis of a claim, if it was flown at the level that the claim is about."""
+    item = levels.get(_JUDGED[name])
+    if item is None or _level(study, name, otherwise) not in item.panel.arms:
+        return None
+    return item if _level(study, name, otherwise) != item.none else None
+
+
+def _no_worse(item: Levels, level: str, metric: Metric, margin: float, statement: str) -> Claim:
+    """A level against none: worse by less than a margin, worse, or undecided."""
     found = compare(pairs_of(item.panel, level, item.none, [metric]), metric)
-    worse = Interval(*sorted(-metric.better * end for end in found.interval))
+    worse = Interval(*sorted(-metric.better * end for end in _ends(found)))
     if worse.high < margin:
         judged = Verdict.REPRODUCED
     else:
@@ -174,9 +191,14 @@ def _no_worse(item: Levels, metric: Metric, margin: float, statement: str) -> Cl
     )
 
 
-def _degrades(item: Levels) -> Claim:
-    """The hardest drift against none, in success and clearance: less is claimed."""
-    level = item.panel.arms[-1]
+def _ends(found: Difference) -> Interval:
+    """Interval of a difference; where it is the same in every pair, as when nothing happened, itself."""
+    alike = math.isnan(found.interval.low) and found.units >= FEWEST_SCENES
+    return Interval(found.mean, found.mean) if alike else found.interval
+
+
+def _degrades(item: Levels, level: str) -> Claim:
+    """A drift against none, in success and clearance: less is claimed."""
     tests = paired_tests(item.panel, (shown.RATE, shown.CLEARANCE), [(item.none, level)])
     return Claim(
         statement=f"Severe drift ({level}) degrades the map: less success or clearance",
@@ -187,21 +209,22 @@ def _degrades(item: Levels) -> Claim:
 
 
 def _tuned(study: Study, trials: pd.DataFrame) -> Iterator[Claim]:
-    """Other thresholds (axis `arm`) against the primary ones under the hardest drift alone."""
+    """Other thresholds (axis `arm`) against the primary ones under severe drift alone."""
     axes = arm_axes(study)
     if DRIFT not in axes or len(axes.get(ARM, ())) < 2:
         return
-    hardest = pd.Series(True, index=trials.index)
+    severe = _level(study, SEVERE_DRIFT, -1)
+    drifting = pd.Series(True, index=trials.index)
     for axis in axes.keys() - {ARM}:
-        hardest &= trials[axis].astype(str) == axes[axis][-1 if axis == DRIFT else 0]
-    arms = arms_flown(trials[hardest], {ARM: axes[ARM]})
-    panel = panel_of(trials[hardest], (ARM,), arms, METRICS)
+        drifting &= trials[axis].astype(str) == (severe if axis == DRIFT else _none(study, axis))
+    arms = arms_flown(trials[drifting], {ARM: axes[ARM]})
+    panel = panel_of(trials[drifting], (ARM,), arms, METRICS)
     primary = _primary(study)
     for other in (arm for arm in arms if arm != primary and primary in arms):
         tests = paired_tests(panel, _TUNED_FOR, [(other, primary)])
         yield Claim(
             statement=f"The threshold can be tuned against drift: {other} is better than {primary} under "
-            f"{axes[DRIFT][-1]} drift",
+            f"{severe} drift",
             source="§4.5",
             verdict=_any_better(tests),
             evidence="; ".join(map(evidence, tests)) + f"; p times {len(tests)} for the verdict",

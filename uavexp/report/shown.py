@@ -9,9 +9,9 @@ PATH = Metric(column="path_length_m", label="Path length, APL [m]", digits=1, be
 TIME = Metric(
     column="completion_time_s", label="Completion time, CT [s]", digits=1, better=-1, needs_arrival=True
 )
-CONTACTS = Metric(column="collision_count", label="Collisions, CC", digits=2, better=-1)
+CONTACTS = Metric(column="collision_count", label="Collisions, CC", digits=2, better=-1, is_count=True)
 CLEARANCE = Metric(column="min_clearance_m", label="Min. clearance, MC [m]", digits=3, better=1)
-REPLANS = Metric(column="replans", label="Replans, RF", digits=1, better=-1)
+REPLANS = Metric(column="replans", label="Replans, RF", digits=1, better=-1, is_count=True)
 TRACKING = Metric(
     column="tracking_error_m",
     label="Tracking error, TE [m RMSE]",
@@ -44,12 +44,16 @@ NEAR_CHANGE = Metric(
     scale=100.0,
 )
 USEFUL = Metric(column="useful_share", label="Useful replans [%]", digits=0, better=1, scale=100.0)
-WASTED = Metric(column="wasted_replans", label="Wasted replans", digits=1, better=-1)
+WASTED = Metric(column="wasted_replans", label="Wasted replans", digits=1, better=-1, is_count=True)
 BLOCKED_DELAY = Metric(
     column="blocked_delay_s", label="Delay from blocked path to request [s]", digits=3, better=-1
 )
 BLOCKED_UNANSWERED = Metric(
-    column="blocked_unanswered", label="Blocked paths without an answer", digits=2, better=-1
+    column="blocked_unanswered",
+    label="Blocked paths without an answer",
+    digits=2,
+    better=-1,
+    is_count=True,
 )
 
 TABLE_1 = (RATE, PATH, TIME, CONTACTS, CLEARANCE, REPLANS, TRACKING)
@@ -70,6 +74,10 @@ CAUSES = {
     )
 }
 
+CAUSE_METRICS = tuple(
+    Metric(column=column, label=label, digits=1, is_count=True) for column, label in CAUSES.items()
+)
+
 FURTHER = (
     DETOUR,
     Metric(column="mean_speed_mps", label="Mean speed [m/s]", digits=2),
@@ -78,14 +86,14 @@ FURTHER = (
     Metric(column="contact_time_s", label="Time in contact [s]", digits=2, better=-1),
     ACCELERATION,
     JERK,
-    *(Metric(column=column, label=label, digits=1) for column, label in CAUSES.items()),
+    *CAUSE_METRICS,
     Metric(column="replans_per_m", label="Replans per metre [1/m]", digits=2),
     Metric(column="replans_per_s", label="Replans per second [1/s]", digits=2),
     NEAR_CHANGE,
     USEFUL,
-    Metric(column="failed_plans", label="Requests without a plan", digits=2, better=-1),
-    Metric(column="dropped_triggers", label="Triggers dropped while planning", digits=2),
-    Metric(column="blocked_episodes", label="Times the path was blocked", digits=2),
+    Metric(column="failed_plans", label="Requests without a plan", digits=2, better=-1, is_count=True),
+    Metric(column="dropped_triggers", label="Triggers dropped while planning", digits=2, is_count=True),
+    Metric(column="blocked_episodes", label="Times the path was blocked", digits=2, is_count=True),
     BLOCKED_DELAY,
     BLOCKED_UNANSWERED,
     Metric(column="tracking_error_max_m", label="Largest tracking error [m]", digits=2, better=-1),

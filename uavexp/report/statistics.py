@@ -23,6 +23,7 @@ RESAMPLES, RESAMPLES_OF_MANY = 4000, 2000
 SEED = 20260310  # of the resampling, fixed: the same trials give the same interval
 _MANY_ROWS = 10_000  # then the scenes decide, and time counts
 _DRAWS_AT_ONCE = 2_000_000
+_ROUNDING = 1e-12  # relative; means of equal values differ by less
 
 Labels = npt.NDArray[Any]
 
@@ -54,6 +55,17 @@ def wilson_interval(successes: float, n: float, level: float = LEVEL) -> Interva
     centre = (rate + z * z / (2.0 * n)) / (1.0 + z * z / n)
     half = z / (1.0 + z * z / n) * math.sqrt(rate * (1.0 - rate) / n + z * z / (4.0 * n * n))
     return Interval(max(centre - half, 0.0), min(centre + half, 1.0))
+
+
+def no_event_interval(n: int, level: float = LEVEL) -> Interval:
+    """Interval of the mean of a count that was zero in every one of n independent trials.
+
+    The exact upper end for a Poisson count, 3.7 / n at 95 %: the "rule of three", two-sided. As
+    with a rate of 0 or 1, nothing shows how trials cluster, and n itself is taken.
+
+    Source: Garwood 1936, "Fiducial limits for the Poisson distribution".
+    """
+    return Interval(0.0, -math.log(0.5 * (1.0 - level)) / n) if n else NOTHING
 
 
 def effective_size(success: Bool, cluster: Labels, level: float = LEVEL) -> float:
@@ -163,7 +175,8 @@ def percentile_interval(samples: Float, units: int, level: float = LEVEL) -> tup
         level: of confidence.
 
     Returns:
-        Lower and upper ends (C,); NaN with fewer than two units.
+        Lower and upper ends (C,); NaN with fewer than two units, and where all samples are the
+        same: equal values leave nothing to resample, which is no evidence that others would equal them.
 
     Source: Hesterberg 2015, "What teachers should know about the bootstrap", section 5.
     """
@@ -175,7 +188,8 @@ def percentile_interval(samples: Float, units: int, level: float = LEVEL) -> tup
     finite = bool(np.isfinite(samples).all())
     quantile = np.quantile if finite else _quantile_of_existing
     low, high = quantile(samples, [tail, 1.0 - tail], axis=0)
-    return low, high
+    alike = high - low <= _ROUNDING * np.maximum(np.abs(low), np.abs(high))
+    return np.where(alike, math.nan, low), np.where(alike, math.nan, high)
 
 
 def _quantile_of_existing(samples: Float, levels: list[float], axis: int) -> Float:

@@ -13,7 +13,8 @@ import contextlib
 import importlib
 import logging
 import multiprocessing
-from collections.abc import Generator, Iterable, Sequence
+import warnings
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from concurrent.futures import CancelledError
 from functools import partial
 from typing import Any
@@ -37,6 +38,7 @@ def run_dask(
     n_jobs: int,
     limits: Limits,
     preload: Sequence[str] = (),
+    version: Callable[[], Any] | None = None,
 ) -> Generator[Done, None, None]:
     """Run jobs on a cluster and yield each when it has ended.
 
@@ -51,17 +53,22 @@ def run_dask(
         n_jobs: workers of a cluster that is started.
         limits: of each job.
         preload: modules that each worker's fork server imports.
+        version: must return the same on every worker as here; asked once, before anything is submitted.
 
     Raises:
-        UavexpError: Dask is not installed, or the cluster cannot be reached or is lost.
+        UavexpError: Dask is not installed, the cluster cannot be reached or is lost, or other
+            versions run there.
     """
     distributed = _import("distributed")
     with contextlib.ExitStack() as stack:
         where = address or stack.enter_context(_cluster(distributed, queue, n_jobs, limits))
         try:
-            client = stack.enter_context(distributed.Client(where, set_as_default=False))
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", distributed.versions.VersionMismatchWarning)  # told below
+                client = stack.enter_context(distributed.Client(where, set_as_default=False))
         except OSError as error:
             raise ConfigError(f"runner.address={address}: no Dask scheduler answers ({error})") from error
+        _require_same_versions(client, version)
         fly = partial(client.submit, _run_on_worker, call, limits=limits, preload=tuple(preload), pure=False)
         futures = {fly(job, key=job.name): job for job in jobs}
         stack.callback(lambda: client.cancel(list(futures)))  # those that have not ended
@@ -78,6 +85,39 @@ def run_dask(
             future = fly(job, key=f"{job.name} alone")
             stack.callback(client.cancel, [future])
             yield _done(job, future) or _killed(job)
+
+
+def _require_same_versions(client: Any, version: Callable[[], Any] | None) -> None:
+    """Refuse a cluster whose scheduler or workers run other packages, or other code by `version`."""
+    differing = differing_packages(client.get_versions(check=False))
+    if differing:
+        raise ConfigError(
+            f"the Dask cluster runs other versions than this command: {'; '.join(differing)}; "
+            "start it from the same environment"
+        )
+    # workers that come later are not asked here; what they return is checked by who calls
+    answers = client.run(version, on_error="return") if version is not None else {}
+    strange = [worker for worker, answer in answers.items() if version is not None and answer != version()]
+    if strange:
+        raise ConfigError(
+            f"{len(strange)} of {len(answers)} Dask workers run another version of uavexp than this command, "
+            f"or none ({strange[0]}); install the same there"
+        )
+
+
+def differing_packages(versions: Mapping[str, Any]) -> list[str]:
+    """Packages whose version on the scheduler or on a worker is not the client's, each with both.
+
+    Args:
+        versions: of `distributed.Client.get_versions`.
+    """
+    here: Mapping[str, str | None] = versions["client"]["packages"]
+    others = [versions["scheduler"], *versions["workers"].values()]
+    return [
+        f"{name} {', '.join(sorted(found))} there, {wanted} here"
+        for name, wanted in here.items()
+        if (found := {str(part["packages"].get(name)) for part in others if part} - {str(wanted)})
+    ]
 
 
 def _done(job: Job, future: Any) -> Done | None:

@@ -7,6 +7,7 @@ import signal
 import traceback
 from pathlib import Path
 
+from uavexp.errors import UavexpError, one_line
 from uavexp.paths import PACKAGE
 from uavexp.sweep.job import Answer, Status
 
@@ -17,7 +18,7 @@ _MOST_FRAMES = 20
 
 def reason_of(error: BaseException) -> str:
     """Type and message of an error in one line."""
-    return f"{type(error).__name__}: {' '.join(str(error).split())}"
+    return f"{type(error).__name__}: {one_line(error)}"
 
 
 def portable_trace(error: BaseException) -> tuple[str, ...]:
@@ -31,7 +32,12 @@ def portable_trace(error: BaseException) -> tuple[str, ...]:
 def failure(error: BaseException) -> Answer:
     """Answer of a call that raised."""
     status = Status.MEMORY if isinstance(error, MemoryError) else Status.RAISED
-    return Answer(status=status, reason=reason_of(error), trace=portable_trace(error))
+    return Answer(
+        status=status,
+        reason=reason_of(error),
+        trace=portable_trace(error),
+        mendable=isinstance(error, UavexpError),
+    )
 
 
 def death(exit_code: int | None, dump: str) -> Answer:

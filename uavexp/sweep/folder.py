@@ -25,10 +25,28 @@ def locked(folder: Path) -> Iterator[None]:
     Raises:
         RecordError: another process holds it.
     """
-    file = (folder / LOCK).open("a+")
-    with file:
+    with _lock_file(folder) as file:
+        with contextlib.suppress(OSError):  # a full disk: the lock holds without the number
+            os.ftruncate(file.fileno(), 0)
+            os.write(file.fileno(), str(os.getpid()).encode())
+        yield
+
+
+def _lock_file(folder: Path) -> IO[str]:
+    """The folder's lock file, open and locked.
+
+    Who leaves an empty folder removes the file while holding it (`uavexp.cli.folders`), so a
+    lock counts only when the file that was locked is still the one of that name.
+    """
+    while True:
+        try:
+            file = (folder / LOCK).open("a+")
+        except OSError as error:
+            raise RecordError(f"{folder}: cannot be locked ({error.strerror})") from error
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if (folder / LOCK).stat().st_ino == os.fstat(file.fileno()).st_ino:
+                return file
         except BlockingIOError as error:
             file.seek(0)
             holder = file.read().strip() or "unknown"
@@ -36,10 +54,9 @@ def locked(folder: Path) -> Iterator[None]:
                 f"{folder}: another command (process {holder}) is flying into it; wait for its end, "
                 "or name another folder with out=DIR"
             ) from error
-        with contextlib.suppress(OSError):  # a full disk: the lock holds without the number
-            os.ftruncate(file.fileno(), 0)
-            os.write(file.fileno(), str(os.getpid()).encode())
-        yield
+        except FileNotFoundError:  # removed between the opening and the locking
+            pass
+        file.close()
 
 
 def put_trial(folder: Path, name: str, files: Mapping[str, bytes]) -> None:
@@ -67,13 +84,13 @@ def put_trial(folder: Path, name: str, files: Mapping[str, bytes]) -> None:
 
 
 def put_world(folder: Path, digest: str, data: bytes) -> None:
-    """Add a world, unless it is there.
+    """Add a world, or mend the file of that name; equal worlds have equal bytes.
 
     Raises:
         RecordError: it cannot be written.
     """
     file = folder / WORLDS / f"{digest}.npz"
-    if not file.exists():
+    if not file.is_file() or file.read_bytes() != data:
         with contextlib.suppress(FileExistsError):
             file.parent.mkdir()
         write_bytes(file, data)

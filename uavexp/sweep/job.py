@@ -9,8 +9,8 @@ from typing import Any
 
 from uavexp.errors import require_positive
 
-Report = Callable[[float, str], None]  # simulated time s, a few words
-Call = Callable[[Any, Report], Any]  # payload in, picklable value out; importable by name
+Progress = Callable[[float, str], None]  # simulated time s, a few words
+Call = Callable[[Any, Progress], Any]  # payload in, picklable value out; importable by name
 
 
 class Status(StrEnum):
@@ -51,6 +51,7 @@ class Answer:
     value: Any = None  # of the call, when its status is ok
     reason: str = ""
     trace: tuple[str, ...] = ()  # frames, without any path of this machine
+    mendable: bool = False  # raised a `UavexpError`: what was asked for is at fault
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -12,7 +13,7 @@ from typing import Any
 
 from uavexp.errors import RecordError
 from uavexp.records import LOG, OtherVersionError, read_record, trial_name
-from uavexp.study import Study, trial_folders
+from uavexp.study import Study, StudyCell, read_runs, trial_folders
 from uavexp.sweep.job import Status
 
 
@@ -32,30 +33,49 @@ class _State(Enum):
     OTHER = auto()
 
 
-def join_studies(stored: Study, asked: Study) -> Study:
-    """The study of a folder after one more command: the larger of the two, with the seeds of both.
+def join_studies(stored: Study, asked: Study, whole: Study | None = None) -> Study:
+    """The study of a folder after one more command, with the seeds of both.
 
     Args:
         stored: what the folder holds.
         asked: what the command asks for.
+        whole: of which both are parts; by default the larger of the two.
 
     Raises:
-        RecordError: neither contains the other.
+        RecordError: one of them is no part of it.
     """
-    larger = asked if _contains(asked, stored) else stored
-    if asked.name != stored.name or not (_contains(larger, asked) and _contains(larger, stored)):
-        raise RecordError(
-            f"{stored.folder} holds the trials of an earlier command"
-            f"{f' ({stored.name})' if stored.name else ''} with other cells; name another folder with out=DIR"
-        )
-    told = replace(asked, cells=larger.cells, axes=larger.axes)
+    whole = whole or (asked if contains(asked, stored) else stored)
+    if asked.name != stored.name or not (contains(whole, asked) and contains(whole, stored)):
+        raise RecordError(_other_study(stored))
+    there = _places(stored) | _places(asked)
+    cells = tuple(cell for cell in whole.cells if _place(cell) in there)
+    told = replace(asked, cells=cells, axes=whole.axes)
     return replace(told, seeds=tuple(sorted({*stored.seeds, *asked.seeds})))
 
 
-def _contains(study: Study, other: Study) -> bool:
-    return {(c.digest, *sorted(c.labels.items())) for c in study.cells} >= {
-        (c.digest, *sorted(c.labels.items())) for c in other.cells
-    }
+def contains(study: Study, other: Study) -> bool:
+    """Whether a study has all cells of another, under the same labels."""
+    return _places(study) >= _places(other)
+
+
+def _places(study: Study) -> set[tuple[Any, ...]]:
+    return {_place(cell) for cell in study.cells}
+
+
+def _place(cell: StudyCell) -> tuple[Any, ...]:
+    """What makes two cells the same; an axis that a part of an experiment lacks is empty in the whole."""
+    return (cell.digest, *sorted(label for label in cell.labels.items() if label[1]))
+
+
+def _other_study(stored: Study) -> str:
+    """What a folder holds and how to go on with it or beside it."""
+    runs = read_runs(stored.folder)
+    command = shlex.join(runs[-1].get("command", ())) if runs else ""
+    holds = f"{stored.folder} holds the trials of an earlier command with other cells"
+    return (
+        f"{holds}{f' (python -m uavexp {command})' if command else ''}; name another folder with out=DIR, "
+        "or type a command that has the earlier cells, too"
+    )
 
 
 def take_stock(folder: Path, version: Mapping[str, Any], *, accept_other_code: bool) -> Stock:

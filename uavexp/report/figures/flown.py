@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from uavexp.errors import RecordError
 from uavexp.report.comparison import SCENE, arm_names
 from uavexp.report.figures.looks import clock_arm, primary_arm
 from uavexp.report.findings import OK, arm_axes, arms_flown
@@ -79,6 +80,9 @@ def shared_worlds(
         flights: of `stored`.
         arms: that must all have flown there.
         scenes: in order.
+
+    Raises:
+        RecordError: the next world or one of its logs is damaged.
     """
     for scene in scenes:
         there = flights[(flights[SCENE] == scene) & flights[ARM].isin(arms)]
@@ -92,6 +96,21 @@ def shared_worlds(
                     logs={arm: study.log(trials[arm]) for arm in arms},
                     trials={arm: trials[arm] for arm in arms},
                 )
+
+
+def shared_world(study: Study, flights: pd.DataFrame, arms: Sequence[str], scene: str) -> SharedWorld:
+    """The first of the `shared_worlds` of one scene.
+
+    Raises:
+        RecordError: there is none, or it is damaged.
+    """
+    shared = next(shared_worlds(study, flights, arms, [scene]), None)
+    if shared is None:
+        where = f" in scene “{scene}”" if scene else ""
+        raise RecordError(
+            f"{TRIALS} and {WORLDS} hold no world{where} with a log of each of {', '.join(arms)}"
+        )
+    return shared
 
 
 def executed(replans: pd.DataFrame, flights: pd.DataFrame) -> pd.DataFrame:

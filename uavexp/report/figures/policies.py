@@ -15,7 +15,7 @@ from uavexp.report.parts import Drawing
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-CAUSES = tuple(Metric(column=column, label=label, digits=1) for column, label in shown.CAUSES.items())
+CAUSES = shown.CAUSE_METRICS
 WORTH = (Metric(column="useful_replans", label="useful", digits=1), shown.WASTED)
 METRICS = (*CAUSES, *WORTH, shown.REPLANS, shown.BLOCKED_DELAY)
 

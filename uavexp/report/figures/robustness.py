@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,19 +27,23 @@ _LOOKS = (PRIMARY, CLOCK, *OTHERS)
 _SPREAD = 0.24  # sideways room of the lines at one level
 
 
-def disturbances(study: Study, note: str) -> Iterator[Drawing]:
-    """Draw, for every arm, each metric over the first disturbance by the second and the third."""
+def disturbances(study: Study, note: str) -> Iterator[tuple[str, Callable[[], Drawing]]]:
+    """For every arm, how to draw each metric over the first disturbance by the second and the third."""
     axes = [name for name in (NOISE, LATENCY, DRIFT) if name in study.axes]
     trials = with_false_triggers(study.trials, study.replans)
     if not axes:
         return
     if ARM not in study.axes:
-        yield _draw(study, trials, axes, "", note)
+        yield _name(study, ""), partial(_draw, study, trials, axes, "", note)
         return
     for arm in sorted(study.axes[ARM], key=lambda name: name != primary_arm(study)):
         mine = trials[trials[ARM].astype(str) == arm]
         if len(mine):
-            yield _draw(study, mine, axes, arm, note)
+            yield _name(study, arm), partial(_draw, study, mine, axes, arm, note)
+
+
+def _name(study: Study, arm: str) -> str:
+    return "disturbances" if arm in ("", primary_arm(study)) else f"disturbances_{_slug(arm)}"
 
 
 def _draw(study: Study, trials: pd.DataFrame, axes: Sequence[str], arm: str, note: str) -> Drawing:
@@ -59,8 +64,7 @@ def _draw(study: Study, trials: pd.DataFrame, axes: Sequence[str], arm: str, not
         figure.legend(
             handles, labels, title=axes[1], loc="outside upper center", ncols=len(labels), fontsize=8
         )
-    name = "disturbances" if arm in ("", primary_arm(study)) else f"disturbances_{_slug(arm)}"
-    return Drawing(name=name, caption=f"{_caption(arm, axes)} {note}", figure=figure)
+    return Drawing(name=_name(study, arm), caption=f"{_caption(arm, axes)} {note}", figure=figure)
 
 
 def _slug(arm: str) -> str:

@@ -1,4 +1,4 @@
-"""Geometry of moving bodies: distances of points, hits of rays, touching boxes (numba, float64)."""
+"""Distances of points to moving bodies (numba, float64)."""
 
 from __future__ import annotations
 
@@ -7,9 +7,16 @@ import math
 import numba as nb
 import numpy as np
 
-from uavexp.types import Bodies, Float, Shape, UInt8
+from uavexp.types import Bodies, Bool, Float, Float32, Shape, UInt8
 
+ABSENT_M = np.array([0.0, 0.0, -1000.0])  # where a body is while it is not there
+LOWEST_M = -500.0  # a body below is not there
 _SPHERE, _CYLINDER = int(Shape.SPHERE), int(Shape.CYLINDER)
+
+
+def present(position_m: Float | Float32) -> Bool:
+    """Which bodies (...,) at positions (..., 3) are there at all, and not at `ABSENT_M`."""
+    return position_m[..., 2] > LOWEST_M
 
 
 @nb.njit(cache=True)

@@ -1,0 +1,153 @@
+"""Time of B-spline smoothing at paper 4's limits: the QP alone, and all of it, behind an A* search.
+
+Process CPU time, the least of several repeats, against other load.
+Run from the repository root: python -m benchmarks.smoothing_bench
+"""
+
+from __future__ import annotations
+
+import gc
+import time
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+from tests.fields import bounds, field_from, warehouse
+from uavexp.geometry import evaluate, polyline_length_m
+from uavexp.planner.free_space import FreeSpace, free_space
+from uavexp.planner.search import PathSearch
+from uavexp.planner.smoothing.basis import make_basis
+from uavexp.planner.smoothing.bspline_qp import BsplineSmoother, Derivative
+from uavexp.planner.smoothing.clearance import shortcut
+from uavexp.planner.smoothing.corridor import make_corridor
+from uavexp.planner.smoothing.quadratic import NO_CUTS, Problem, Solution, solve
+from uavexp.planner.timing import resample, smooth, time_profile
+from uavexp.types import Float, Goal, Limits, PlanRequest, PlanStatus
+
+LIMITS = Limits(
+    max_speed_mps=5.0, max_acceleration_mps2=3.5, max_body_rate_radps=2.0, body_size_m=(0.32, 0.32, 0.12)
+)
+CLEARANCE_M, REPEATS, CONTROL_POINTS = 0.26, 5, 30
+
+
+def least_ms(work: Callable[[], object]) -> float:
+    """Least process time of several calls, ms, after one that compiles."""
+    work()
+    spent = []
+    for _ in range(REPEATS):
+        began = time.process_time()
+        work()
+        spent.append(time.process_time() - began)
+    return 1e3 * min(spent)
+
+
+def tasks(seeds: int, count: int) -> list[tuple[PlanRequest, Float]]:
+    """Requests of 15 to 28 m from rest to rest in cluttered halls, each with its A* path."""
+    made: list[tuple[PlanRequest, Float]] = []
+    for seed in range(seeds):
+        grid = warehouse(seed)
+        field, rng = field_from(grid), np.random.default_rng(seed)
+        search = PathSearch(
+            min_clearance_m=CLEARANCE_M,
+            safe_clearance_m=0.75,
+            clearance_weight=2.0,
+            z_band_m=0.3,
+            known_only=False,
+            max_expansions=300_000,
+        )
+        wanted = len(made) + count
+        while len(made) < wanted:
+            ends = rng.uniform([1.0, 1.0, 1.1], [25.0, 15.0, 1.6], (2, 3))
+            if field.distance_m(ends).min() < 0.4:
+                continue
+            found = search.find(field, ends[0], ends[1], bounds(grid))
+            if found.status is PlanStatus.OK and 15.0 < polyline_length_m(found.path_m) < 28.0:
+                request = PlanRequest(
+                    time_s=0.0,
+                    position_m=ends[0],
+                    velocity_mps=np.zeros(3),
+                    acceleration_mps2=np.zeros(3),
+                    goal=Goal(position_m=ends[1], is_target=True, score=0.0),
+                    field=field,
+                    flight_bounds_m=bounds(grid),
+                )
+                made.append((request, found.path_m))
+    return made
+
+
+def qp_alone(request: PlanRequest, path_m: Float) -> tuple[Solution, float]:
+    """The paper's QP with 30 control points: all cuts of the limits included; ms."""
+    space = _space(request)
+    fine = resample(shortcut(resample(path_m, 0.1), space), 0.1)
+    limits = (LIMITS.max_speed_mps, LIMITS.max_acceleration_mps2)
+    times = time_profile(smooth(fine, 10), 0.0, 0.0, *limits)
+    basis = make_basis(3, CONTROL_POINTS - 3, 2)
+    points, guess = (
+        np.stack([np.interp(np.linspace(0.0, times[-1], count), times, c) for c in fine.T], axis=1)
+        for count in (CONTROL_POINTS - 2, CONTROL_POINTS)
+    )
+    corridor = make_corridor(request.field, points, request.flight_bounds_m, CLEARANCE_M, False)
+    ends = np.zeros((2, 3, 3))
+    ends[:, 0] = fine[[0, -1]]
+    h = 1.05 * float(times[-1]) / len(basis.bezier)
+    problem = Problem(basis, corridor, guess, ends[0], ends[1], *limits)
+    answer = solve(problem, h, NO_CUTS, 12)
+    for _ in range(20):  # the shortest duration, to 8 %, that keeps the limits
+        if answer.control is not None:
+            break
+        h *= 1.08
+        answer = solve(problem, h, NO_CUTS, 12)
+    return answer, least_ms(lambda: solve(problem, h, NO_CUTS, 12))
+
+
+def _space(request: PlanRequest) -> FreeSpace:
+    ends = np.stack([request.position_m, request.goal.position_m])
+    return free_space(request.field, ends, request.flight_bounds_m, CLEARANCE_M, np.inf, False)
+
+
+def measure() -> dict[str, float]:
+    """Times, ms, and qualities of the trajectories."""
+    work = tasks(3, 8)
+    figures: dict[str, float] = {}
+    gc.disable()
+    qps = [qp_alone(*task) for task in work]
+    solved = [(answer, spent) for answer, spent in qps if answer.control is not None]
+    figures["qp_30_points_solved"] = len(solved) / len(qps)
+    figures["qp_30_points_rounds"] = float(np.mean([answer.solves for answer, _ in solved]))
+    figures["qp_30_points_median_ms"] = float(np.median([spent for _, spent in solved]))
+    figures["qp_30_points_per_round_median_ms"] = float(
+        np.median([spent / answer.solves for answer, spent in solved])
+    )
+    for kind in Derivative:
+        smoother, spent, stretch, over, ok = BsplineSmoother(derivative=kind), [], [], 0.0, 0
+        least = np.inf
+        for request, path in work:
+            result = smoother.smooth(request, path, None, LIMITS, CLEARANCE_M, False)
+            spent.append(least_ms(partial(smoother.smooth, request, path, None, LIMITS, CLEARANCE_M, False)))
+            if result.trajectory is None:
+                continue
+            ok += 1
+            times = np.append(np.arange(0.0, result.trajectory.end_s, 1e-3), result.trajectory.end_s)
+            p, v, a = evaluate(result.trajectory, times)
+            straight = polyline_length_m(shortcut(resample(path, 0.1), _space(request)))
+            stretch.append(polyline_length_m(p) / straight)
+            speed = np.linalg.norm(v, axis=1).max() / LIMITS.max_speed_mps
+            strength = np.linalg.norm(a, axis=1).max() / LIMITS.max_acceleration_mps2
+            over, least = max(over, speed, strength), min(least, request.field.distance_m(p).min())
+        figures |= {
+            f"{kind}_planned_share": ok / len(work),
+            f"{kind}_median_ms": float(np.median(spent)),
+            f"{kind}_most_ms": float(np.max(spent)),
+            f"{kind}_length_over_shortcut_median": float(np.median(stretch)),
+            f"{kind}_length_over_shortcut_most": float(np.max(stretch)),
+            f"{kind}_most_share_of_a_limit": float(over),
+            f"{kind}_least_clearance_m": float(least),
+        }
+    gc.enable()
+    return figures
+
+
+if __name__ == "__main__":
+    for name, value in measure().items():
+        print(f"{name:42s} {value:8.3f}")

@@ -1,0 +1,89 @@
+"""The position-velocity loop with the body rate that the reference itself asks for.
+
+Feedback, thrust and attitude are those of `position_velocity`. To the attitude loop it also gives the
+rate at which the wanted attitude turns, which differential flatness takes from acceleration and jerk of
+the reference (`uavexp.flatness`), so the attitude need not lag behind for the rate to come:
+
+    W_ff = W(a_ref + g e3 + (c / m) |v| v, its derivative, yaw, yaw rate)
+
+turned into the frame of the wanted attitude, which the feedback tilts off the reference's. Leading the
+attitude by the lag of rate loop and rotors was tried and is worse: the rate suffices.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numba as nb
+
+from uavexp.controller.position_velocity import PositionVelocity
+from uavexp.flatness import attitude_and_rate
+from uavexp.geometry import GRAVITY_MPS2, rotation_from_quaternion
+from uavexp.types import Command, Float, Limits, Reference, State
+
+
+@nb.njit(cache=True)
+def _feed_forward(
+    velocity_mps: Float,
+    acceleration_mps2: Float,
+    jerk_mps3: Float,
+    yaw_rad: float,
+    yaw_rate_radps: float,
+    drag_per_m: float,
+    attitude: Float,
+) -> Float:
+    """Body rate (3,) of the reference, in the frame of the wanted attitude (4,)."""
+    speed = math.sqrt((velocity_mps**2).sum())
+    thrust = acceleration_mps2 + drag_per_m * speed * velocity_mps
+    thrust[2] += GRAVITY_MPS2
+    change = jerk_mps3 + drag_per_m * speed * acceleration_mps2
+    if speed > 0.0:
+        change += drag_per_m * (velocity_mps * acceleration_mps2).sum() / speed * velocity_mps
+    rotation, rate = attitude_and_rate(thrust, change, yaw_rad, yaw_rate_radps)
+    turned: Float = rotation_from_quaternion(attitude).T @ (rotation @ rate)
+    return turned
+
+
+@dataclass(slots=True, kw_only=True)
+class Flatness:
+    """Position-velocity loop with body-rate feed-forward from differential flatness."""
+
+    rate_hz: float = 100.0
+    position_gain_per_s: float = 2.0
+    velocity_gain_per_s: float = 5.0
+    max_correction_mps: float = 1.0
+    max_tilt_rad: float = 0.6
+    drag_kgpm: float = 0.0026
+    _loop: PositionVelocity = field(init=False, repr=False)
+    _drag_per_m: float = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check every parameter."""
+        self._loop = PositionVelocity(
+            rate_hz=self.rate_hz,
+            position_gain_per_s=self.position_gain_per_s,
+            velocity_gain_per_s=self.velocity_gain_per_s,
+            max_correction_mps=self.max_correction_mps,
+            max_tilt_rad=self.max_tilt_rad,
+            drag_kgpm=self.drag_kgpm,
+        )
+
+    def reset(self, limits: Limits, mass_kg: float) -> None:
+        """Begin a trial of a vehicle of this mass."""
+        self._loop.reset(limits, mass_kg)
+        self._drag_per_m = self.drag_kgpm / mass_kg
+
+    def command(self, estimated_state: State, reference: Reference) -> Command:
+        """Return thrust, attitude and body rate that lead the state to the reference."""
+        wanted = self._loop.command(estimated_state, reference)
+        rate = _feed_forward(
+            reference.velocity_mps,
+            reference.acceleration_mps2,
+            reference.jerk_mps3,
+            float(reference.yaw_rad),
+            float(reference.yaw_rate_radps),
+            self._drag_per_m,
+            wanted.quaternion_wxyz,
+        )
+        return Command(thrust_N=wanted.thrust_N, quaternion_wxyz=wanted.quaternion_wxyz, body_rate_radps=rate)

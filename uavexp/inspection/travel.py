@@ -1,0 +1,290 @@
+"""Travel lengths that respect walls: shortest paths on a lattice of a distance field.
+
+The lattice has nodes where the vehicle fits, joined to their 26 neighbours where it also
+fits halfway; only the part joined to the start is kept. Between two points the length is
+that of the straight line where the vehicle fits along it, else that of the shortest path
+over the lattice, an upper bound of the true one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba as nb
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from uavexp.errors import require_positive
+from uavexp.mapping.base import DistanceField
+from uavexp.types import Bool, Float, Float32, Int, Int32
+
+_UNITS = 500  # of the longest edge: lengths are whole numbers, so buckets serve as queue
+_BUCKETS = 512  # > _UNITS
+_STEPS = np.array(
+    [(i, j, k) for i in (0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1) if (i, j, k) > (0, 0, 0)]
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lattice:
+    """Nodes that can be reached from the start, and the edges between them in compressed rows."""
+
+    field: DistanceField
+    clearance_m: float
+    origin_m: Float  # (3,) of node (0, 0, 0)
+    step_m: Float  # (3,)
+    node: Int32  # (X, Y, Z) number of a node, -1: not reachable
+    position_m: Float  # (M, 3)
+    starts: Int32  # (M + 1,)
+    ends: Int32  # (E,) both ways
+    units: Int32  # (E,) length
+    unit_m: float
+
+
+def lattice_of(
+    field: DistanceField,
+    flight_bounds_m: Float,
+    start_m: Float,
+    clearance_m: float = 0.45,
+    cell_m: float = 0.2,
+    layer_m: float = 0.4,
+) -> Lattice:
+    """Lattice of the free space joined to a start.
+
+    Args:
+        field: distances to obstacles.
+        flight_bounds_m: (2, 3) box that holds all nodes.
+        start_m: (3,); its part of the lattice is that of the nearest node within three cells.
+        clearance_m: that every node has.
+        cell_m: horizontal spacing.
+        layer_m: vertical spacing.
+
+    Returns:
+        the lattice; without nodes when the start is near none.
+    """
+    require_positive(clearance_m=clearance_m, cell_m=cell_m, layer_m=layer_m)
+    step = np.array([cell_m, cell_m, layer_m])
+    room = np.asarray(flight_bounds_m[1] - flight_bounds_m[0], dtype=np.float64)
+    shape = np.maximum(np.floor(room / step + 1e-9).astype(int) + 1, 1)
+    origin = np.asarray(flight_bounds_m[0]) + 0.5 * (room - (shape - 1) * step)
+    points = origin + np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1) * step
+    passable = (field.distance_m(points.reshape(-1, 3)) >= clearance_m).reshape(shape)
+    position = points[passable]
+    number = np.full(shape, -1, dtype=np.int32)
+    number[passable] = np.arange(position.shape[0])
+    pairs = _edges(field, number, position, clearance_m)
+    part = _part_of(position, pairs, start_m, 3.0 * max(cell_m, layer_m))
+    renumbered = np.cumsum(part, dtype=np.int32) - 1
+    pairs = renumbered[pairs[part[pairs[:, 0]]]]
+    position = position[part]
+    number[passable] = np.where(part, renumbered, -1)
+    unit = float(np.linalg.norm(step)) / _UNITS
+    both = np.concatenate([pairs, pairs[:, ::-1]])
+    both = both[np.lexsort((both[:, 1], both[:, 0]))]
+    length = np.linalg.norm(position[both[:, 0]] - position[both[:, 1]], axis=1)
+    return Lattice(
+        field=field,
+        clearance_m=clearance_m,
+        origin_m=origin,
+        step_m=step,
+        node=number,
+        position_m=position,
+        starts=np.searchsorted(both[:, 0], np.arange(position.shape[0] + 1)).astype(np.int32),
+        ends=np.ascontiguousarray(both[:, 1], dtype=np.int32),
+        units=np.round(length / unit).astype(np.int32),
+        unit_m=unit,
+    )
+
+
+def _edges(field: DistanceField, number: Int32, position: Float, clearance_m: float) -> Int:
+    """Pairs of neighbouring nodes (E, 2) between which the vehicle fits, each once."""
+    found = [np.zeros((0, 2), dtype=np.int64)]
+    for step in _STEPS:
+        here, there = [], []
+        for axis, shift in enumerate(step):
+            count = number.shape[axis]
+            here.append(slice(max(-shift, 0), count - max(shift, 0)))
+            there.append(slice(max(shift, 0), count - max(-shift, 0)))
+        pair = np.stack([number[tuple(here)].ravel(), number[tuple(there)].ravel()], axis=1)
+        pair = pair[(pair >= 0).all(axis=1)]
+        halfway = 0.5 * (position[pair[:, 0]] + position[pair[:, 1]])
+        found.append(pair[field.distance_m(halfway) >= clearance_m])
+    return np.concatenate(found)
+
+
+def _part_of(position: Float, pairs: Int, start_m: Float, reach_m: float) -> Bool:
+    """Nodes (M,) joined to the one nearest to the start."""
+    count = position.shape[0]
+    apart = np.linalg.norm(position - start_m, axis=1)
+    if count == 0 or not apart.min() <= reach_m:
+        return np.zeros(count, dtype=np.bool_)
+    graph = coo_matrix((np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    _, label = connected_components(graph, directed=False)
+    joined: Bool = label == label[apart.argmin()]
+    return joined
+
+
+def gates(lattice: Lattice, points_m: Float) -> tuple[Int, Float]:
+    """Nodes through which points (N, 3) enter the lattice: numbers (N, 8), -1 for none, and legs m.
+
+    They are the corners of the lattice's cell around a point to which the vehicle fits
+    halfway; a point with less clearance than the nodes may enter too, the start may be such.
+    """
+    low = np.floor((points_m - lattice.origin_m) / lattice.step_m).astype(np.int64)
+    shape = np.array(lattice.node.shape)
+    corner = np.array([(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+    index = np.clip(low[:, None] + corner, 0, shape - 1)
+    number = lattice.node[index[..., 0], index[..., 1], index[..., 2]].astype(np.int64)
+    if lattice.position_m.shape[0] == 0:
+        return np.full(number.shape, -1), np.full(number.shape, np.inf)
+    node_m = lattice.position_m[number]
+    leg = np.linalg.norm(node_m - points_m[:, None], axis=2)
+    halfway = 0.5 * (node_m + points_m[:, None])
+    room = lattice.field.distance_m(halfway.reshape(-1, 3)).reshape(leg.shape)
+    open_ = (
+        (number >= 0) & (room >= 0.5 * lattice.clearance_m) & (leg <= 2.0 * np.linalg.norm(lattice.step_m))
+    )
+    return np.where(open_, number, -1), np.where(open_, leg, np.inf)
+
+
+def is_reachable(lattice: Lattice, points_m: Float) -> Bool:
+    """Whether the vehicle can come from the start to each point (N, 3) with its clearance (N,)."""
+    number, _ = gates(lattice, points_m)
+    reachable: Bool = (number >= 0).any(axis=1) & (lattice.field.distance_m(points_m) >= lattice.clearance_m)
+    return reachable
+
+
+def travel_lengths(lattice: Lattice, from_m: Float, to_m: Float) -> Float:
+    """Lengths (F, T) from points (F, 3) to points (T, 3), m; inf where there is no way.
+
+    Dijkstra (1959) with Dial's (1969) buckets, one run for each of the first points.
+    """
+    number, leg = gates(lattice, from_m)
+    other, other_leg = gates(lattice, to_m)
+    over = _over_lattice(
+        lattice.starts, lattice.ends, lattice.units, lattice.unit_m, number, leg, other, other_leg
+    )
+    straight = _straight(
+        lattice.field.distance,
+        lattice.field.origin_m,
+        lattice.field.voxel_size_m,
+        lattice.clearance_m,
+        from_m,
+        to_m,
+    )
+    return np.minimum(over, straight)
+
+
+def travel_matrix(lattice: Lattice, points_m: Float) -> Float:
+    """Symmetric lengths (N, N) between points (N, 3), m, 0 on the diagonal."""
+    one_way = travel_lengths(lattice, points_m, points_m)
+    both = np.minimum(one_way, one_way.T)
+    np.fill_diagonal(both, 0.0)
+    return np.asarray(both)
+
+
+@nb.njit(cache=True)
+def _over_lattice(
+    starts: Int32,
+    ends: Int32,
+    units: Int32,
+    unit_m: float,
+    gate: Int,
+    leg: Float,
+    other: Int,
+    other_leg: Float,
+) -> Float:
+    """Least length (F, T) from any gate of one point to any gate of another, legs included."""
+    length = np.full((gate.shape[0], other.shape[0]), np.inf)
+    nodes = starts.shape[0] - 1
+    far = np.int32(2**31 - 1)
+    reached = np.empty(nodes, dtype=np.int32)
+    node_of = np.empty(ends.shape[0] + gate.shape[1], dtype=np.int32)  # entries of the bucket lists
+    following = np.empty_like(node_of)
+    head = np.empty(_BUCKETS, dtype=np.int32)
+    for source in range(gate.shape[0]):
+        reached[:] = far
+        head[:] = -1
+        entries, waiting, now = 0, 0, 0
+        for item in range(gate.shape[1]):
+            node = gate[source, item]
+            if node < 0:
+                continue
+            begin = np.int32(min(leg[source, item] / unit_m + 0.5, 2.0 * _UNITS))
+            if begin < reached[node]:
+                reached[node] = begin
+        for item in range(gate.shape[1]):  # legs of any length: entered when their time comes
+            node = gate[source, item]
+            if node >= 0:
+                node_of[entries], following[entries] = node, head[reached[node] % _BUCKETS]
+                head[reached[node] % _BUCKETS] = entries
+                entries, waiting = entries + 1, waiting + 1
+        while waiting > 0:
+            entry = head[now % _BUCKETS]
+            if entry < 0:
+                now += 1
+                continue
+            later = -1
+            while entry >= 0:
+                head[now % _BUCKETS] = following[entry]
+                node = node_of[entry]
+                if reached[node] > now:  # a long leg, of a later round
+                    following[entry], later = later, entry
+                elif reached[node] == now:
+                    waiting -= 1
+                    for edge in range(starts[node], starts[node + 1]):
+                        near, there = ends[edge], now + units[edge]
+                        if there < reached[near]:
+                            reached[near] = there
+                            node_of[entries], following[entries] = near, head[there % _BUCKETS]
+                            head[there % _BUCKETS] = entries
+                            entries, waiting = entries + 1, waiting + 1
+                else:
+                    waiting -= 1  # outdated
+                entry = head[now % _BUCKETS]
+            head[now % _BUCKETS] = later
+            now += 1
+        for target in range(other.shape[0]):
+            for item in range(other.shape[1]):
+                node = other[target, item]
+                if node >= 0 and reached[node] < far:
+                    way = reached[node] * unit_m + other_leg[target, item]
+                    length[source, target] = min(length[source, target], way)
+    return length
+
+
+@nb.njit(cache=True)
+def _straight(
+    distance: Float32, origin: Float, voxel: float, clearance: float, from_m: Float, to_m: Float
+) -> Float:
+    """Length (F, T) of the straight line where its inside keeps the clearance, else inf.
+
+    Marched in strides of the room there is (sphere tracing, Hart 1996), half a voxel at
+    least. Read from the nearest voxel, which tells distances to half a voxel.
+    """
+    length = np.full((from_m.shape[0], to_m.shape[0]), np.inf)
+    shape = distance.shape
+    for a in range(from_m.shape[0]):
+        for b in range(to_m.shape[0]):
+            x, y, z = to_m[b, 0] - from_m[a, 0], to_m[b, 1] - from_m[a, 1], to_m[b, 2] - from_m[a, 2]
+            total = np.sqrt(x * x + y * y + z * z)
+            along, clear = 0.0, True
+            while along < total:
+                share = along / total
+                i = int((from_m[a, 0] + x * share - origin[0]) / voxel)
+                j = int((from_m[a, 1] + y * share - origin[1]) / voxel)
+                k = int((from_m[a, 2] + z * share - origin[2]) / voxel)
+                i, j, k = (
+                    min(max(i, 0), shape[0] - 1),
+                    min(max(j, 0), shape[1] - 1),
+                    min(max(k, 0), shape[2] - 1),
+                )
+                room = distance[i, j, k] - clearance
+                if room < -0.5 * voxel:
+                    clear = False
+                    break
+                along += max(room, 0.5 * voxel)
+            if clear:
+                length[a, b] = total
+    return length

@@ -1,0 +1,174 @@
+"""Map backend `known`: the true fixed geometry, known from the start; for studies of planning alone.
+
+It is the map that a perfect sensor would have made in the end, with the same rule: a voxel is
+occupied when the signed distance of its centre to the true surfaces is below
+`occupied_below_m`, negative inside of solids. Meshes need not be closed, so what is inside is
+told by air instead: steps from the start bubble (`mark_free`), from voxel centre to
+neighbouring centre, that cross no surface. What no such steps reach is solid: the insides of
+things, and what lies behind closed walls. A sheet with air on both sides has no inside: of two
+reached neighbours with a surface between them, the nearer one is occupied (both, at equal
+distance). Movers are not in it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numba as nb
+import numpy as np
+
+from uavexp.errors import require, require_positive
+from uavexp.mapping.base import FREE, OCCUPIED, DistanceField
+from uavexp.mapping.esdf import SignedDistance, distance_table
+from uavexp.mapping.occupancy import grid_shape
+from uavexp.scene import Scene
+from uavexp.types import Float, Float32, MapUpdate, Scan, UInt8
+
+_BYTES_PER_VOXEL = 80  # ESDF 19, centres, rays and distances while it is made
+_SAME_M = 1e-4  # distances nearer than this are equal: the scene's are float32
+
+
+@nb.njit(cache=True)
+def _air(crossed: UInt8, begin: tuple[int, int, int]) -> UInt8:
+    """Which voxels (X, Y, Z) are reached from one of them; bit a of `crossed`: no step up along axis a."""
+    nx, ny, nz = crossed.shape
+    reached = np.zeros(crossed.shape, np.uint8)
+    stack, count = np.empty((crossed.size, 3), np.int32), 1
+    stack[0, 0], stack[0, 1], stack[0, 2] = begin
+    reached[begin] = 1
+    while count > 0:
+        count -= 1
+        x, y, z = stack[count, 0], stack[count, 1], stack[count, 2]
+        for axis in range(3):
+            for way in (-1, 1):
+                i, j, k = x + way * (axis == 0), y + way * (axis == 1), z + way * (axis == 2)
+                if i < 0 or j < 0 or k < 0 or i >= nx or j >= ny or k >= nz or reached[i, j, k]:
+                    continue
+                lower = crossed[x, y, z] if way > 0 else crossed[i, j, k]
+                if (lower >> axis) & 1:
+                    continue
+                reached[i, j, k] = 1
+                stack[count, 0], stack[count, 1], stack[count, 2] = i, j, k
+                count += 1
+    return reached
+
+
+@nb.njit(cache=True)
+def _sheets(crossed: UInt8, reached: UInt8, distance: Float32, same: float, state: UInt8) -> None:
+    """Occupy the nearer one of two reached neighbours with a surface between them."""
+    for x in range(crossed.shape[0]):
+        for y in range(crossed.shape[1]):
+            for z in range(crossed.shape[2]):
+                for axis in range(3):
+                    if not (crossed[x, y, z] >> axis) & 1:
+                        continue
+                    i, j, k = x + (axis == 0), y + (axis == 1), z + (axis == 2)
+                    if not (reached[x, y, z] and reached[i, j, k]):
+                        continue
+                    here, there = distance[x, y, z], distance[i, j, k]
+                    if here <= there + same:
+                        state[x, y, z] = OCCUPIED
+                    if there <= here + same:
+                        state[i, j, k] = OCCUPIED
+
+
+@dataclass(slots=True, kw_only=True)
+class Known:
+    """The true fixed geometry as a voxel map, complete with the first update."""
+
+    voxel_size_m: float = 0.10
+    esdf_rate_hz: float = 10.0
+    max_distance_m: float = 2.0
+    occupied_below_m: float = 0.025
+    max_memory_mb: float = 1000.0
+    _scene: Scene | None = dataclasses.field(default=None, init=False, repr=False)
+    _esdf: SignedDistance = dataclasses.field(init=False, repr=False)
+    _field: DistanceField = dataclasses.field(init=False, repr=False)
+    _made: UInt8 = dataclasses.field(init=False, repr=False)  # state as of the next update
+
+    def __post_init__(self) -> None:
+        require_positive(
+            voxel_size_m=self.voxel_size_m,
+            esdf_rate_hz=self.esdf_rate_hz,
+            max_distance_m=self.max_distance_m,
+            max_memory_mb=self.max_memory_mb,
+        )
+        require(
+            0.0 <= self.occupied_below_m < 0.5 * self.voxel_size_m,
+            "occupied_below_m must be >= 0 and below half of voxel_size_m = "
+            f"{self.voxel_size_m}, got {self.occupied_below_m}",
+        )
+        distance_table(self.voxel_size_m, self.max_distance_m)
+
+    def reset(self, bounds_m: Float, scene: Scene) -> None:
+        """Begin a trial in `scene` inside `bounds_m` (2, 3); unknown until a ball is marked free.
+
+        Raises:
+            WorldError: the map would need more than `max_memory_mb`.
+        """
+        shape = grid_shape(bounds_m, self.voxel_size_m, self.max_memory_mb, _BYTES_PER_VOXEL)
+        self._scene = scene
+        self._esdf = SignedDistance(shape, self.voxel_size_m, self.max_distance_m)
+        self._made = np.zeros(shape, np.uint8)
+        self._field = DistanceField(
+            origin_m=np.array(bounds_m[0], dtype=np.float64),
+            voxel_size_m=self.voxel_size_m,
+            max_distance_m=self.max_distance_m,
+            distance=self._esdf.distance,
+            state=np.zeros(shape, np.uint8),
+        )
+
+    def mark_free(self, centre_m: Float, radius_m: float) -> None:
+        """Make the map: free is the air that holds a point, for which it has to lie in the bounds."""
+        scene, shape = self._begun(), self._made.shape
+        distance_m, crossed = self._measured(scene)
+        inside = np.clip(
+            (np.asarray(centre_m) - self._field.origin_m) / self.voxel_size_m, 0, np.array(shape) - 1
+        )
+        x, y, z = (int(i) for i in inside)
+        reached = _air(crossed, (x, y, z))
+        air = (reached == 1) & (distance_m >= self.occupied_below_m)
+        self._made = np.where(air, FREE, OCCUPIED).astype(np.uint8)
+        _sheets(crossed, reached, distance_m, _SAME_M, self._made)
+
+    def integrate(self, scan: Scan) -> None:
+        """Learn nothing: all is known."""
+
+    def update(self, time_s: float) -> MapUpdate:
+        """Return what changed since the last call: everything, first seen, at the first one."""
+        self._begun()
+        before, after = self._field.state.reshape(-1), self._made.reshape(-1)
+        flipped = np.flatnonzero((before == OCCUPIED) != (after == OCCUPIED)).astype(np.int32)
+        first_seen = np.flatnonzero((before == 0) & (after != 0)).astype(np.int32)
+        before[:] = after
+        return self._esdf.update(time_s, self._field.state, flipped, first_seen)
+
+    @property
+    def field(self) -> DistanceField:
+        """The distance field, as of the last `update`."""
+        self._begun()
+        return self._field
+
+    def _begun(self) -> Scene:
+        if self._scene is None:
+            raise RuntimeError("reset() must come first")
+        return self._scene
+
+    def _measured(self, scene: Scene) -> tuple[Float32, UInt8]:
+        """Distance of every voxel centre to the surfaces, m, and which steps up (bit: axis) cross one."""
+        shape = self._made.shape
+        centres_m = self._field.voxel_centres_m(np.arange(self._made.size))
+        distance_m = scene.fixed_distance_m(centres_m).astype(np.float32)
+        near = np.flatnonzero(distance_m <= self.voxel_size_m + _SAME_M)
+        rays = np.zeros((near.size, 6), np.float32)
+        rays[:, :3] = centres_m[near]
+        crossed = np.zeros(self._made.size, np.uint8)
+        for axis in range(3):
+            rays[:, 3:] = self.voxel_size_m * np.eye(3)[axis]
+            hit, _ = scene.fixed_cast(rays)
+            crossed[near[hit <= 1.0]] |= np.uint8(1 << axis)
+        grid = crossed.reshape(shape)
+        for axis in range(3):  # the last ones have no neighbour
+            np.moveaxis(grid, axis, 0)[-1] &= np.uint8(~(1 << axis) & 0xFF)
+        return distance_m.reshape(shape), grid

@@ -1,0 +1,179 @@
+"""How well the movers were tracked and predicted, against the truth in the log.
+
+Matching is that of the CLEAR MOT metrics (Bernardin and Stiefelhagen 2008): a pair of the
+previous instant is kept while it stays within the gate, the rest is assigned with the
+least total distance. A track is taken to be of the ESDF update that it was logged at.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from uavexp.types import Contact, Float, Int, TrialLog
+
+HORIZONS_S = (0.3, 0.6, 0.9, 1.2)
+MEAN_HORIZONS_S = tuple(0.1 * step for step in range(1, 13))  # the mean is taken over these
+GATE_M = 1.0
+WITHIN_M = 6.0
+_ABSENT_M = -500.0  # a mover below this height is not there (`bodies`)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrackQuality:
+    """Errors of one flight's tracks; NaN where there is nothing to average."""
+
+    position_error_m: float  # mean over matched pairs and instants
+    prediction_error_m: tuple[float, ...]  # mean at each of `HORIZONS_S`
+    mean_prediction_error_m: float  # mean over the horizon, 0.1 to 1.2 s
+    missed_share: float  # of mover instants within `within_m` of the vehicle, in sight or not
+    false_share: float  # of track instants that match no mover
+    identity_switches: int  # matches of a mover to another track than its last
+
+
+def measures(log: TrialLog, near_miss_m: float) -> dict[str, bool | int | float | str]:
+    """What `summary` reports of a flight with movers; nothing at all without."""
+    if not log.mover_clearance_m.size:
+        return {}
+    tracks = quality(log)
+    at = zip(HORIZONS_S, tracks.prediction_error_m, strict=True)
+    return {
+        "mover_contacts": sum(contact.mover >= 0 for contact in log.contacts),
+        "min_mover_clearance_m": float(log.mover_clearance_m.min()),
+        "near_miss_distance_m": near_miss_m,
+        "near_misses": near_misses(log.time_s, log.mover_clearance_m, log.contacts, near_miss_m),
+        "track_error_m": tracks.position_error_m,
+        **{f"prediction_error_{horizon_s:g}s_m": error_m for horizon_s, error_m in at},
+        "prediction_error_mean_m": tracks.mean_prediction_error_m,
+        "missed_track_share": tracks.missed_share,
+        "false_track_share": tracks.false_share,
+        "identity_switches": tracks.identity_switches,
+    }
+
+
+def predicted_errors_m(
+    now_s: float,
+    position_m: Float,
+    velocity_mps: Float,
+    times_s: Float,
+    truth_m: Float,
+    ahead_s: Sequence[float],
+) -> Float:
+    """Distances (H,) of constant-velocity predictions from the true positions; NaN after the last one.
+
+    Args:
+        now_s: when the prediction is made.
+        position_m: (3,) believed.
+        velocity_mps: (3,) believed.
+        times_s: (T,) increasing times of the truth.
+        truth_m: (T, 3) true positions.
+        ahead_s: horizons (H,).
+    """
+    later_s = now_s + np.asarray(ahead_s)
+    true_m = np.stack([np.interp(later_s, times_s, truth_m[:, axis]) for axis in range(3)], axis=1)
+    predicted_m = position_m + np.asarray(ahead_s)[:, None] * velocity_mps
+    error_m: Float = np.linalg.norm(predicted_m - true_m, axis=1)
+    return np.where(later_s <= times_s[-1] + 1e-9, error_m, np.nan)
+
+
+def match(apart_m: Float, previous: dict[int, int], identity: Int, gate_m: float) -> dict[int, int]:
+    """Track index of each matched mover at one instant.
+
+    Args:
+        apart_m: (B, N) distances of movers from tracks.
+        previous: identity of the track that each mover was last matched with.
+        identity: (N,) of the tracks.
+        gate_m: farther pairs do not match.
+    """
+    from scipy.optimize import linear_sum_assignment
+
+    index = {int(one): n for n, one in enumerate(identity)}
+    kept = {
+        mover: index[track]
+        for mover, track in previous.items()
+        if track in index and apart_m[mover, index[track]] <= gate_m
+    }
+    movers = [mover for mover in range(len(apart_m)) if mover not in kept]
+    tracks = [n for n in range(apart_m.shape[1]) if n not in kept.values()]
+    cost = np.minimum(apart_m[np.ix_(movers, tracks)], 1e6)
+    row, column = linear_sum_assignment(np.where(cost <= gate_m, cost, 1e6))
+    new = {movers[r]: tracks[c] for r, c in zip(row, column, strict=True) if cost[r, c] <= gate_m}
+    return kept | new
+
+
+def quality(log: TrialLog, *, gate_m: float = GATE_M, within_m: float = WITHIN_M) -> TrackQuality:
+    """Compare the tracks of a flight with the movers.
+
+    Args:
+        log: of a flight with movers.
+        gate_m: a track farther from a mover is not of it.
+        within_m: only movers so near to the vehicle can be missed.
+    """
+    ends = np.cumsum(log.track_count)
+    previous: dict[int, int] = {}
+    apart: list[float] = []
+    ahead: list[Float] = []
+    near = missed = matched = switches = 0
+    for tick, (now_s, end) in enumerate(zip(log.tick_s, ends, strict=True)):
+        mine = slice(end - log.track_count[tick], end)
+        step = min(round(now_s / log.step_s), len(log.time_s) - 1)
+        movers_m = log.mover_position_m[step].astype(np.float64)
+        there = movers_m[:, 2] > _ABSENT_M
+        apart_m = np.linalg.norm(movers_m[:, None] - log.track_position_m[mine][None], axis=2)
+        apart_m[~there] = np.inf
+        identity = log.track_identity[mine]
+        pairs = match(apart_m, previous, identity, gate_m)
+        matched += len(pairs)
+        close = there & (np.linalg.norm(movers_m - log.position_m[step], axis=1) <= within_m)
+        near += int(close.sum())
+        missed += sum(mover not in pairs for mover in np.flatnonzero(close))
+        for mover, n in pairs.items():
+            switches += previous.get(mover, int(identity[n])) != identity[n]
+            previous[mover] = int(identity[n])
+            apart.append(float(apart_m[mover, n]))
+            if log.mover_position_m[-1, mover, 2] > _ABSENT_M:
+                ahead.append(
+                    predicted_errors_m(
+                        now_s, log.track_position_m[mine][n], log.track_velocity_mps[mine][n], log.time_s,
+                        log.mover_position_m[:, mover].astype(np.float64), (*HORIZONS_S, *MEAN_HORIZONS_S),
+                    )
+                )  # fmt: skip
+    errors_m = np.array(ahead).reshape(-1, len(HORIZONS_S) + len(MEAN_HORIZONS_S))
+    full_m = errors_m[np.isfinite(errors_m).all(axis=1)]
+    tracks = int(log.track_count.sum())
+    return TrackQuality(
+        position_error_m=_mean(np.array(apart)),
+        prediction_error_m=tuple(_mean(full_m[:, h]) for h in range(len(HORIZONS_S))),
+        mean_prediction_error_m=_mean(full_m[:, len(HORIZONS_S) :]),
+        missed_share=missed / near if near else math.nan,
+        false_share=(tracks - matched) / tracks if tracks else math.nan,
+        identity_switches=switches,
+    )
+
+
+def near_misses(time_s: Float, mover_clearance_m: Float, contacts: Sequence[Contact], near_m: float) -> int:
+    """Number of times that a mover came nearer than `near_m` to the body's centre and did not touch it.
+
+    One from the step at which the clearance falls below until it is above again; one in which
+    a mover was touched is a contact and no near miss.
+
+    Args:
+        time_s: (T,).
+        mover_clearance_m: (T,) distance of the body's centre to the nearest mover.
+        contacts: of the flight.
+        near_m: limit, m.
+    """
+    near = np.concatenate([[False], mover_clearance_m < near_m, [False]])
+    first, last = np.flatnonzero(near[1:] & ~near[:-1]), np.flatnonzero(near[:-1] & ~near[1:]) - 1
+    touched = [contact for contact in contacts if contact.mover >= 0]
+    return sum(
+        not any(one.start_s <= time_s[end] and one.end_s >= time_s[begin] for one in touched)
+        for begin, end in zip(first, last, strict=True)
+    )
+
+
+def _mean(values: Float) -> float:
+    return float(values.mean()) if values.size else math.nan

@@ -1,0 +1,56 @@
+"""How long, how straight and how level a path is (Liao et al., table 1, which gives no formulas).
+
+Paths are polylines (P, 3) in any unit of length; repeated points are left out.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from uavexp.types import Float
+
+_LEVEL = 1e-6  # share of the path's extent below which a height difference is rounding
+
+
+def _steps(path: Float) -> Float:
+    steps = np.diff(np.asarray(path, dtype=np.float64), axis=0)
+    return np.asarray(steps[np.linalg.norm(steps, axis=1) > 0.0])
+
+
+def path_length(path: Float) -> float:
+    """Σ of the lengths of the segments, in the path's unit."""
+    return float(np.linalg.norm(_steps(path), axis=1).sum())
+
+
+def height_reversals(path: Float) -> int:
+    """How often climbing turns into sinking or back: sign changes of Δz, level steps left out."""
+    rise = _steps(path)[:, 2]
+    rise = rise[np.abs(rise) > _LEVEL * (1.0 + np.abs(rise).max(initial=0.0))]
+    return int(np.count_nonzero(np.diff(np.sign(rise))))
+
+
+def excess_climb(path: Float) -> float:
+    """Σ|Δz| − |z_goal − z_start|: height gained and lost for nothing, in the path's unit, >= 0."""
+    rise = _steps(path)[:, 2]
+    return max(float(np.abs(rise).sum() - abs(rise.sum())), 0.0)
+
+
+def _turns_rad(path: Float) -> Float:
+    """Angle between each segment and the next."""
+    steps = _steps(path)
+    unit = steps / np.linalg.norm(steps, axis=1, keepdims=True)
+    cosine = np.einsum("nd,nd->n", unit[:-1], unit[1:])
+    sine = np.linalg.norm(np.cross(unit[:-1], unit[1:]), axis=1)
+    return np.asarray(np.arctan2(sine, cosine))
+
+
+def cumulative_heading_change_rad(path: Float) -> float:
+    """Sum of the angles between each segment and the next, over the whole path, rad."""
+    return float(_turns_rad(path).sum())
+
+
+def mean_heading_change_rad(path: Float) -> float:
+    """Mean angle of the places where the direction changes at all, rad; 0 for a straight path."""
+    turns = _turns_rad(path)
+    turns = turns[turns > _LEVEL]
+    return float(turns.mean()) if turns.size else 0.0

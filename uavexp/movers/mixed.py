@@ -1,0 +1,194 @@
+"""Movers of several shapes and sizes that move in several ways, all drawn from the seed.
+
+Spheres fly, people (upright cylinders) and boxes stand on the floor; `motion` says how they
+move. Every number is drawn before the flight; nothing reacts to the vehicle. A mover is placed
+on air that is joined with the start, where its box meets no surface (so none starts inside a
+wall or on the far side of one), apart from all others, and no nearer to the start than the
+vehicle's stopping distance v^2 / (2 a) plus `start_margin_m`, surface to surface.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from uavexp.errors import WorldError, require, require_non_negative, require_positive
+from uavexp.movers.motion import POSITION, REST, WAY, Mode, advance, is_blocked
+from uavexp.movers.placing import Air
+from uavexp.movers.timeline import Timeline, row_of
+from uavexp.scene import Scene
+from uavexp.types import Bodies, Float, Limits, Shape, UInt8, World
+
+_CHUNK = 1000  # rows made at once
+_ATTEMPTS = 300  # drawings of a mover before giving up
+_CIRCLE_STEP_M = 0.05  # between the places of a circle that are tested
+
+
+@dataclass(slots=True, kw_only=True)
+class Mixed:
+    """Linear, circular and accelerated movers: spheres, people and boxes."""
+
+    count: int = 8
+    speed_mps: Sequence[float] = (0.4, 1.5)
+    linear_share: float = 0.5
+    circular_share: float = 0.25
+    sphere_share: float = 0.3
+    person_share: float = 0.4
+    sphere_radius_m: Sequence[float] = (0.15, 0.35)
+    person_radius_m: Sequence[float] = (0.22, 0.30)
+    person_height_m: float = 1.7
+    box_width_m: Sequence[float] = (0.3, 0.8)
+    box_height_m: Sequence[float] = (0.8, 1.8)
+    circle_radius_m: Sequence[float] = (0.6, 2.0)
+    period_s: Sequence[float] = (2.0, 5.0)
+    restitution: float = 0.9
+    start_margin_m: float = 0.75
+    _scene: Scene = field(init=False, repr=False)
+    _bounds_m: tuple[Float, Float] = field(init=False, repr=False)  # (B, 3) of the centres, each
+    _mode: UInt8 = field(init=False, repr=False)
+    _state: Float = field(init=False, repr=False)
+    _timeline: Timeline = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check every parameter."""
+        whole = isinstance(self.count, int) and not isinstance(self.count, bool)
+        require(whole and 1 <= self.count <= 200, f"count must be 1 to 200, got {self.count}")
+        ranges = (
+            "speed_mps", "sphere_radius_m", "person_radius_m", "box_width_m", "box_height_m",
+            "circle_radius_m", "period_s",
+        )  # fmt: skip
+        for name in ranges:
+            pair = [float(value) for value in getattr(self, name)]
+            require(len(pair) == 2, f"{name} must be [least, greatest], got {pair}")
+            require_positive(**{f"{name}[0]": pair[0], f"{name}[1]": pair[1]})
+            require(pair[0] <= pair[1], f"{name} must be [least, greatest], got {pair}")
+        require_positive(person_height_m=self.person_height_m)
+        require_non_negative(start_margin_m=self.start_margin_m)
+        require(0.0 < self.restitution <= 1.0, f"restitution must be > 0 and <= 1, got {self.restitution}")
+        pairs = (("linear_share", "circular_share"), ("sphere_share", "person_share"))
+        for names in pairs:
+            shares = [getattr(self, name) for name in names]
+            require(
+                min(shares) >= 0.0 and sum(shares) <= 1.0 + 1e-9,
+                f"{names[0]} and {names[1]} must be >= 0 with a sum <= 1, got {shares[0]} and {shares[1]}",
+            )
+
+    def reset(self, world: World, scene: Scene, limits: Limits, rng: np.random.Generator) -> None:
+        """Begin a trial: draw all movers.
+
+        Raises:
+            ConfigError: a mover could be faster than the vehicle.
+            WorldError: the movers do not fit in.
+        """
+        require(
+            self.speed_mps[1] <= limits.max_speed_mps,
+            f"movers.speed_mps must be at most the vehicle's {limits.max_speed_mps:g} m/s, "
+            f"got {self.speed_mps[1]:g}",
+        )
+        air = Air(world, scene)
+        keep_m = limits.max_speed_mps**2 / (2.0 * limits.max_acceleration_mps2) + limits.body_radius_m
+        low, high = np.empty((self.count, 3)), np.empty((self.count, 3))
+        shape, mode = np.empty(self.count, np.uint8), np.empty(self.count, np.uint8)
+        half, state = np.empty((self.count, 3)), np.zeros((self.count, 10))
+        for b in range(self.count):
+            for _ in range(_ATTEMPTS):
+                shape[b], half[b] = self._draw_body(rng)
+                state[b, POSITION] = centre = air.draw(rng, half[b], stands=shape[b] != Shape.SPHERE)
+                low[b], high[b] = air.bounds_m(half[b], centre, stands=shape[b] != Shape.SPHERE)
+                mode[b] = self._draw_motion(rng, state[b], flies=shape[b] == Shape.SPHERE)
+                apart = np.linalg.norm(state[:b, :2] - centre[:2], axis=1) > np.linalg.norm(
+                    half[:b, :2], axis=1
+                ) + np.linalg.norm(half[b, :2])
+                away = math.dist(centre[:2], world.start_m[:2]) - float(np.linalg.norm(half[b, :2]))
+                if (
+                    away > keep_m + self.start_margin_m
+                    and apart.all()
+                    and air.holds(centre, half[b])
+                    and self._fits(scene, low[b], high[b], half[b], mode[b], state[b])
+                ):
+                    break
+            else:
+                message = (
+                    f"movers: no room for number {b + 1} of {self.count} after {_ATTEMPTS} drawings; "
+                    "fewer or smaller ones, or a smaller start_margin_m"
+                )
+                raise WorldError(message)
+        self._scene, self._bounds_m, self._mode, self._state = scene, (low, high), mode, state
+        nothing = np.empty((0, self.count, 3))
+        self._timeline = Timeline(shape, half, nothing, nothing)
+
+    def at(self, time_s: float) -> Bodies:
+        """The bodies at a time >= 0; rows are made in chunks as they are asked for."""
+        while row_of(time_s) >= self._timeline.position_m.shape[0]:
+            self._go_on()
+        return self._timeline.at(time_s, time_s)
+
+    def _go_on(self) -> None:
+        """Add a chunk of rows."""
+        shape, half, position, velocity = self._timeline
+        more_m, more_mps = np.empty((_CHUNK, self.count, 3)), np.empty((_CHUNK, self.count, 3))
+        advance(
+            self._scene.grid, *self._bounds_m, self._mode, half, float(self.restitution),
+            self._state, position.shape[0], more_m, more_mps,
+        )  # fmt: skip
+        self._timeline = Timeline(
+            shape, half, np.concatenate([position, more_m]), np.concatenate([velocity, more_mps])
+        )
+
+    def _draw_body(self, rng: np.random.Generator) -> tuple[Shape, Float]:
+        """Draw a shape and its half size (3,)."""
+        kind, size, height = rng.random(), rng.random(2), rng.random()
+        if kind < self.sphere_share:
+            radius = _between(self.sphere_radius_m, size[0])
+            return Shape.SPHERE, np.full(3, radius)
+        if kind < self.sphere_share + self.person_share:
+            radius = _between(self.person_radius_m, size[0])
+            return Shape.CYLINDER, np.array([radius, radius, 0.5 * self.person_height_m])
+        width, depth = (_between(self.box_width_m, value) for value in size)
+        return Shape.BOX, 0.5 * np.array([width, depth, _between(self.box_height_m, height)])
+
+    def _draw_motion(self, rng: np.random.Generator, state: Float, *, flies: bool) -> Mode:
+        """Draw how a body moves from its position; fills the rest of its state (10,)."""
+        kind, heading, climb, turn = rng.random(4)
+        slow, fast = np.sort(rng.random(2))
+        speed = _between(self.speed_mps, fast)
+        angle = 2.0 * math.pi * heading
+        rise = math.radians(20.0) * (2.0 * climb - 1.0) if flies else 0.0
+        way = np.array([math.cos(rise) * math.cos(angle), math.cos(rise) * math.sin(angle), math.sin(rise)])
+        extra = rng.random(2)
+        if kind < self.linear_share:
+            state[WAY] = speed * way
+            return Mode.LINEAR
+        if kind < self.linear_share + self.circular_share:
+            radius = _between(self.circle_radius_m, extra[0])
+            centre = state[:2] - radius * way[:2] / np.linalg.norm(way[:2])
+            state[REST] = [*centre, radius, (speed if turn < 0.5 else -speed) / radius]
+            return Mode.CIRCULAR
+        least = _between(self.speed_mps, slow)
+        state[WAY] = way
+        state[REST] = [
+            0.5 * (speed + least),
+            0.5 * (speed - least),
+            2.0 * math.pi / _between(self.period_s, extra[0]),
+            2.0 * math.pi * extra[1],
+        ]
+        return Mode.ACCELERATED
+
+    @staticmethod
+    def _fits(scene: Scene, low: Float, high: Float, half: Float, mode: int, state: Float) -> bool:
+        """Whether a mover is clear where it starts, and on its whole circle if it has one."""
+        places = state[None, POSITION]
+        if mode == Mode.CIRCULAR:
+            x, y, radius, _ = state[REST]
+            angle = np.linspace(0.0, 2.0 * math.pi, math.ceil(2.0 * math.pi * radius / _CIRCLE_STEP_M))
+            level = np.full(angle.shape, state[2])
+            places = np.stack([x + radius * np.cos(angle), y + radius * np.sin(angle), level], axis=1)
+        half = half + (0.5 * _CIRCLE_STEP_M if mode == Mode.CIRCULAR else 0.0) * np.array([1.0, 1.0, 0.0])
+        return not any(is_blocked(scene.grid, low, high, half, place) for place in places)
+
+
+def _between(limits: Sequence[float], share: float) -> float:
+    return float(limits[0]) + share * (float(limits[1]) - float(limits[0]))

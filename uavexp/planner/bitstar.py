@@ -1,0 +1,73 @@
+"""BIT* of OMPL (Gammell, Srinivasa and Barfoot 2015), an independent peer of `df_bitstar`."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from uavexp.errors import require_non_negative, require_option, require_positive
+from uavexp.planner.ompl_process import Query, require_ompl, search_with_ompl
+from uavexp.planner.sampling import (
+    FoundWay,
+    finish,
+    refusal,
+    require_known_or_not,
+    require_whole,
+    space_of,
+)
+from uavexp.planner.smoothing import Smoothing, make_smoother
+from uavexp.planner.smoothing.base import Smoother
+from uavexp.types import Limits, PlanRequest, PlanResult
+
+
+@dataclass(slots=True, kw_only=True)
+class Bitstar:
+    """OMPL's BITstar on the project's free space, smoothed."""
+
+    min_clearance_m: float = 0.26
+    z_band_m: float = 0.3
+    unknown: str = "optimistic"
+    batch_samples: int = 100
+    rewire_factor: float = 1.1
+    max_iterations: int = 20_000
+    smoothing: Smoothing = Smoothing.BSPLINE_QP
+    derivative: str = "acceleration"
+    _limits: Limits | None = field(default=None, init=False, repr=False)
+    _smoother: Smoother | None = field(default=None, init=False, repr=False)
+    _seed: int = field(default=1, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        require_positive(min_clearance_m=self.min_clearance_m, rewire_factor=self.rewire_factor)
+        require_non_negative(z_band_m=self.z_band_m)
+        require_whole(batch_samples=self.batch_samples, max_iterations=self.max_iterations)
+        require_known_or_not(self.unknown)
+        self.smoothing = require_option("smoothing", self.smoothing, Smoothing)
+        self._smoother = make_smoother(self.smoothing, self.derivative)
+
+    def reset(self, limits: Limits, rng: np.random.Generator) -> None:
+        """Begin a trial of a vehicle with these limits; every request is searched with the same seed.
+
+        Raises:
+            ConfigError: when OMPL is not installed.
+        """
+        require_ompl("bitstar")
+        self._limits = limits
+        self._seed = int(rng.integers(1, 2**31))
+
+    def plan(self, request: PlanRequest) -> PlanResult:
+        """Return a trajectory or the reason why there is none (`Planner.plan`)."""
+        if self._limits is None or self._smoother is None:
+            raise RuntimeError("plan() needs reset() first")
+        began_s = time.perf_counter()
+        known_only = self.unknown == "conservative"
+        refused = refusal(request, self._limits, self.min_clearance_m, known_only)
+        if refused is not None:
+            return PlanResult(status=refused.status, reason=refused.reason)
+        space = space_of(request, self.min_clearance_m, self.z_band_m, known_only)
+        settings = {"setSamplesPerBatch": self.batch_samples, "setRewireFactor": self.rewire_factor}
+        answer = search_with_ompl(Query("BITstar", settings, space, self._seed, self.max_iterations))
+        reason = "" if len(answer.path) else f"not found in {answer.iterations} iterations"
+        found = FoundWay(answer.path, None, answer.history[:, :2], answer.iterations, answer.checks, reason)
+        return finish(request, found, self._smoother, self._limits, self.min_clearance_m, known_only, began_s)

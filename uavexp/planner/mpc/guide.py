@@ -1,0 +1,179 @@
+"""The static spline as a guide: planned from a request, kept between requests while it holds."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from uavexp.geometry import evaluate
+from uavexp.planner.brake import braking_trajectory, stopping_distance_m
+from uavexp.planner.mpc.static_problem import Settings
+from uavexp.planner.mpc.static_spline import START_EXCESS, instants, shape_spline
+from uavexp.planner.search import PathSearch
+from uavexp.planner.smoothing.clearance import shortfall
+from uavexp.planner.spline import join
+from uavexp.types import Float, Goal, PlanRequest, PlanResult, PlanStatus, Trajectory
+
+_MENDED_BY_BRAKING = (PlanStatus.NOT_CLEAR, PlanStatus.LIMITS, PlanStatus.SOLVER)
+_REST_MPS = 0.05  # a slower start counts as standing
+_TANGENT_M = 1.0  # length over which the path's last direction is taken
+_AHEAD_M = 0.05  # spacing at which the way beyond a moving end is checked
+_PHASE_S = 0.02  # spacing at which the nearest point of the spline is looked for
+_PHASE_WEIGHT_S2 = 0.01  # of the velocity there: it tells the two ways through a crossing apart
+
+
+class Guide(NamedTuple):
+    """What is kept between the requests of a trial."""
+
+    goal: Goal
+    spline: Trajectory
+    path_m: Float  # (P, 3)
+    flown: Trajectory | None  # the last plan made along it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StaticPlanner:
+    """A* path, then the spline; from a moving start that defeats it, brakes first."""
+
+    search: PathSearch
+    settings: Settings
+    end_speed_mps: float  # at a goal that is not the target
+    stop_at_ends: bool  # repeated control points: the spline begins and ends at rest
+
+    def plan(self, request: PlanRequest) -> PlanResult:
+        """Return a trajectory among static obstacles or the reason why there is none."""
+        moving = float(np.linalg.norm(request.velocity_mps)) > _REST_MPS
+        if self.stop_at_ends and (moving or np.any(request.acceleration_mps2)):
+            failed = PlanResult(status=PlanStatus.NOT_CLEAR, reason="cannot stop here")
+            return self.after_stop(request, self.brake(request), failed)
+        result = self._attempt(request)
+        if result.status in _MENDED_BY_BRAKING and moving:
+            return self.after_stop(request, self.brake(request), result)
+        return result
+
+    def after_stop(self, request: PlanRequest, stop: Trajectory, failed: PlanResult) -> PlanResult:
+        """Come to rest that way, and fly from there; `failed` when that fails, too."""
+        way = evaluate(stop, instants(stop))[0]
+        if self.shortfall(request, way):
+            return failed
+        standing = replace(
+            request,
+            time_s=stop.end_s,
+            position_m=way[-1],
+            velocity_mps=np.zeros(3),
+            acceleration_mps2=np.zeros(3),
+        )
+        onward = self._attempt(standing)
+        answer = failed
+        if onward.trajectory is not None:
+            path = np.concatenate([request.position_m[None], onward.path_m])
+            joined = join(stop, onward.trajectory)
+            answer = replace(onward, trajectory=joined, path_m=path, reason="brakes first")
+        return replace(
+            answer,
+            iterations=failed.iterations + onward.iterations,
+            expansions=failed.expansions + onward.expansions,
+            wall_search_s=failed.wall_search_s + onward.wall_search_s,
+            wall_optimise_s=failed.wall_optimise_s + onward.wall_optimise_s,
+        )
+
+    def shortfall(self, request: PlanRequest, points_m: Float) -> str:
+        """Say where a curve through these points (P, 3) meets a mapped obstacle; "" when it does not."""
+        settings = self.settings
+        strongest = settings.limits.max_acceleration_mps2
+        return shortfall(request, points_m, settings.min_clearance_m, strongest, settings.known_only)
+
+    def _attempt(self, request: PlanRequest) -> PlanResult:
+        """Search and shape once."""
+        began, goal_m = time.perf_counter(), request.goal.position_m
+        reason = self._refusal(request)
+        if reason:
+            return PlanResult(status=PlanStatus.LIMITS, reason=reason)
+        found = self.search.find(request.field, request.position_m, goal_m, request.flight_bounds_m)
+        searched = time.perf_counter()
+        if found.status is not PlanStatus.OK:
+            return PlanResult(
+                status=found.status,
+                reason=found.reason,
+                expansions=found.expansions,
+                wall_search_s=searched - began,
+            )
+        shaped = shape_spline(request, found.path_m, self._end_velocity(request, found.path_m), self.settings)
+        return PlanResult(
+            status=shaped.status,
+            trajectory=shaped.trajectory,
+            path_m=found.path_m,
+            reason=shaped.reason,
+            iterations=shaped.iterations,
+            expansions=found.expansions,
+            wall_search_s=searched - began,
+            wall_optimise_s=time.perf_counter() - searched,
+        )
+
+    def _refusal(self, request: PlanRequest) -> str:
+        """Why no trajectory can begin like this; "" when one may."""
+        limits = self.settings.limits
+        speed = float(np.linalg.norm(request.velocity_mps))
+        strength = float(np.linalg.norm(request.acceleration_mps2))
+        fast = speed > START_EXCESS * limits.max_speed_mps
+        strong = strength > START_EXCESS * limits.max_acceleration_mps2
+        return f"the start has {speed:.2f} m/s and {strength:.2f} m/s²" if fast or strong else ""
+
+    def brake(self, request: PlanRequest) -> Trajectory:
+        """The way to rest in a straight line."""
+        state = (request.position_m, request.velocity_mps, request.acceleration_mps2)
+        return braking_trajectory(request.time_s, *state, self.settings.limits)
+
+    def _end_velocity(self, request: PlanRequest, path_m: Float) -> Float:
+        """Velocity (3,) along the path's end that can be reached, and stopped from on clear ground."""
+        if request.goal.is_target or self.stop_at_ends or self.end_speed_mps == 0.0:
+            return np.zeros(3)
+        limits, goal_m = self.settings.limits, path_m[-1]
+        back_m = np.cumsum(np.linalg.norm(np.diff(path_m[::-1], axis=0), axis=1))
+        near = min(int(np.searchsorted(back_m, _TANGENT_M)) + 1, len(path_m) - 1)
+        along = goal_m - path_m[-1 - near]
+        length = float(np.linalg.norm(along))
+        if length < 1e-6:
+            return np.zeros(3)
+        start = float(np.linalg.norm(request.velocity_mps))
+        reachable = float(np.sqrt(start**2 + limits.max_acceleration_mps2 * back_m[-1]))
+        speed = min(self.end_speed_mps, 0.9 * limits.max_speed_mps, reachable)
+        for share in (1.0, 0.7, 0.4):
+            stop_m = stopping_distance_m(share * speed, limits) + _AHEAD_M
+            ahead = np.arange(0.0, stop_m, _AHEAD_M)[:, None] * along / length
+            if not self.shortfall(request, goal_m + ahead):
+                return np.asarray(share * speed / length * along)
+        return np.zeros(3)
+
+
+def phase_of(spline: Trajectory, state: Float, from_s: float = -np.inf) -> tuple[float, float]:
+    """Time on the spline of the point nearest to a state (3, 3), and how far that is, m.
+
+    Args:
+        spline: to be looked along.
+        state: position, velocity and acceleration.
+        from_s: no earlier time is looked at.
+    """
+    begin = min(max(spline.start_s, from_s), spline.end_s)
+    times = np.append(np.arange(begin, spline.end_s, _PHASE_S), spline.end_s)
+    place, velocity, _ = evaluate(spline, times)
+    apart2 = ((place - state[0]) ** 2).sum(axis=1)
+    best = int(np.argmin(apart2 + _PHASE_WEIGHT_S2 * ((velocity - state[1]) ** 2).sum(axis=1)))
+    return float(times[best]), float(np.sqrt(apart2[best]))
+
+
+def still_holds(guide: Guide, request: PlanRequest, planner: StaticPlanner, within_m: float) -> bool:
+    """Whether a guide leads to the request's goal, is near its start, and clear on its map."""
+    wanted = request.goal
+    if wanted.is_target != guide.goal.is_target or np.any(wanted.position_m != guide.goal.position_m):
+        return False
+    state = np.stack([request.position_m, request.velocity_mps, request.acceleration_mps2])
+    phase_s, apart_m = phase_of(guide.spline, state)
+    if apart_m > within_m:
+        return False
+    times = instants(guide.spline)
+    left = evaluate(guide.spline, np.append(phase_s, times[times > phase_s]))[0]
+    return not planner.shortfall(request, left)

@@ -1,0 +1,72 @@
+"""Shortcuts through free space, and the last word on whether a curve is clear."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from uavexp.planner.free_space import FreeSpace, straight_is_free
+from uavexp.types import Float, PlanRequest
+
+_START_SLACK_M = 0.01  # by which a start below the hard limit may come closer still
+
+
+def shortcut(points_m: Float, space: FreeSpace) -> Float:
+    """The polyline (P, 3) without the points that straight free ways skip; both ends kept.
+
+    Greedy from the start: each way reaches on as long as it stays free. The given segments are
+    taken as free, so a path that is nowhere free enough comes back as it is.
+    """
+    kept, at = [0], 0
+    while at < len(points_m) - 1:
+        reached = at + 1
+        stride = 1
+        while stride:  # gallop ahead while it is free, then halve
+            there = min(reached + stride, len(points_m) - 1)
+            free = there > reached and straight_is_free(space, points_m[at], points_m[there])[0]
+            if free:
+                reached, stride = there, 2 * stride
+            else:
+                stride = stride // 2
+        kept.append(reached)
+        at = reached
+    return np.asarray(points_m[kept])
+
+
+def shortfall(
+    request: PlanRequest,
+    points_m: Float,
+    min_clearance_m: float,
+    max_acceleration_mps2: float,
+    known_only: bool,
+) -> str:
+    """Say where a curve through these points (P, 3) from the request's start is not clear; "" when it is.
+
+    A start below the limit may come no closer to the obstacle than its speed towards it makes
+    unavoidable; once it has reached the limit it keeps it.
+    """
+    field, bounds = request.field, request.flight_bounds_m
+    clearance = field.distance_m(points_m)
+    enough = clearance >= min_clearance_m
+    if not enough[0]:
+        escaped = int(np.argmax(enough)) if enough.any() else len(points_m)
+        towards = max(-float(field.gradient(points_m[:1])[0] @ request.velocity_mps), 0.0)
+        stop_m = towards**2 / (2.0 * max_acceleration_mps2)
+        enough[:escaped] = clearance[:escaped] >= max(clearance[0] - stop_m - _START_SLACK_M, 0.0)
+    if not enough.all():
+        worst = int(np.argmin(np.where(enough, np.inf, clearance)))
+        return f"clearance {clearance[worst]:.2f} m at {_text(points_m[worst])}"
+    # a start outside the bounds may come back, not go further
+    low, high = np.minimum(bounds[0], points_m[0]) - 1e-6, np.maximum(bounds[1], points_m[0]) + 1e-6
+    outside = ((points_m < low) | (points_m > high)).any(axis=1)
+    if outside.any():
+        return f"leaves the flight bounds at {_text(points_m[int(np.argmax(outside))])}"
+    if known_only:
+        known = field.observed(points_m)
+        known[: int(np.argmax(known))] = True  # a start in unknown space may leave it
+        if not known.all():
+            return f"enters unknown space at {_text(points_m[int(np.argmin(known))])}"
+    return ""
+
+
+def _text(point: Float) -> str:
+    return "(" + ", ".join(f"{value:.2f}" for value in point) + ") m"

@@ -1,0 +1,52 @@
+"""Spinning LiDAR: rings of rays at fixed elevations, all around."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from uavexp.errors import require
+from uavexp.scene import Scene
+from uavexp.sensor.lidar import LidarParameters, take_scan
+from uavexp.types import Float32, RayScan, State
+
+
+@dataclass(slots=True, kw_only=True)
+class LidarSpinning(LidarParameters):
+    """A full turn a scan; rings evenly spaced over the vertical field, its ends included."""
+
+    rings: int = 16
+    azimuths: int = 360
+    lowest_deg: float = -20.0
+    highest_deg: float = 10.0
+    _scene: Scene = field(init=False, repr=False)
+    _rng: np.random.Generator = field(init=False, repr=False)
+    _direction: Float32 = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check every parameter."""
+        LidarParameters.__post_init__(self)
+        for name, count, most in (("rings", self.rings, 256), ("azimuths", self.azimuths, 8192)):
+            whole = isinstance(count, int) and not isinstance(count, bool)
+            require(whole and 2 <= count <= most, f"{name} must be a whole number, 2 to {most}, got {count}")
+        require(
+            -90.0 < self.lowest_deg < self.highest_deg < 90.0,
+            "-90 < lowest_deg < highest_deg < 90 must hold, got "
+            f"lowest_deg {self.lowest_deg}, highest_deg {self.highest_deg}",
+        )
+
+    def reset(self, scene: Scene, rng: np.random.Generator) -> None:
+        """Begin a trial in `scene`, drawing noise from `rng`."""
+        self._scene, self._rng = scene, rng
+        elevation, azimuth = np.meshgrid(
+            np.radians(np.linspace(self.lowest_deg, self.highest_deg, self.rings)),
+            2.0 * np.pi * np.arange(self.azimuths) / self.azimuths,
+        )
+        level = np.cos(elevation)
+        grid = np.stack([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)], axis=-1)
+        self._direction = grid.reshape(-1, 3).astype(np.float32)
+
+    def capture(self, true_state: State, estimated_state: State, time_s: float) -> RayScan:
+        """Measure from the true pose; the scan carries the pose believed (estimated)."""
+        return take_scan(self, self._direction, self._scene, self._rng, (true_state, estimated_state), time_s)
