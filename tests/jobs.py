@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from uavexp.errors import ConfigError
 from uavexp.sweep.job import Progress
 
 
@@ -31,6 +32,10 @@ def _note(folder: Path) -> None:
 
 def _raise(_: Any) -> None:
     raise ZeroDivisionError("no such luck")
+
+
+def _raise_bad_input(_: Any) -> None:
+    raise ConfigError("no such device")
 
 
 def _segfault(_: Any) -> None:
@@ -86,6 +91,7 @@ DEEDS = {
     "sleep": time.sleep,
     "spin": _spin,
     "raise": _raise,
+    "raise_bad_input": _raise_bad_input,
     "segfault": _segfault,
     "hog": _hog,
     "kill": _kill_oneself,

@@ -8,7 +8,6 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +16,12 @@ import pytest
 
 import uavexp
 from uavexp.__main__ import main
-from uavexp.errors import ConfigError, WorldError
+from uavexp.errors import ConfigError
 from uavexp.logs import read_log
 from uavexp.metrics import evaluate
 from uavexp.paths import PACKAGE, conf_folder
 from uavexp.records import read_record
 from uavexp.table import FIRST
-from uavexp.trial import fly_trial
 
 TINY = ("world=random_columns", "world.size_m=[8,6,3]")
 
@@ -275,23 +273,13 @@ def test_an_installed_package_finds_its_configuration_inside_itself(tmp_path: Pa
     assert str(tmp_path / "outputs") in done.stdout
 
 
-def failing(seed: int, error: BaseException) -> Callable[..., Any]:
-    """The real flight, except that one seed raises."""
-
-    def fly(parts: Any, given: int, progress: Any = None) -> Any:
-        if given == seed:
-            raise error
-        return fly_trial(parts, given, progress)
-
-    return fly
+FAULTY = ("--config-dir", str(PACKAGE.parent / "tests" / "faulty"), *TINY, "trigger=faulty", "seed=0")
 
 
-def test_a_trial_that_raises_leaves_a_record(
-    somewhere: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr("uavexp.trial.fly_trial", failing(0, ZeroDivisionError("no such luck")))
-    assert main([*TINY, "seed=0", "out=run"]) == 1
-    assert "ZeroDivisionError: no such luck" in capsys.readouterr().out
+def test_a_trial_that_raises_leaves_a_record(somewhere: Path) -> None:
+    done = run(*FAULTY, "trigger.deed=raise", "out=run", cwd=somewhere, UAVEXP_TRUST="tests")
+    assert done.returncode == 1, done.stderr
+    assert "ZeroDivisionError: no such luck" in done.stdout
     table = pd.read_parquet(somewhere / "run" / "trials.parquet")
     assert list(table["outcome"]) == ["error"]
     assert list(table["success"]) == [False]
@@ -303,19 +291,16 @@ def test_a_trial_that_raises_leaves_a_record(
     assert not any(str(PACKAGE) in line for line in record["traceback"])
 
 
-def test_bad_input_that_shows_only_in_flight_is_still_bad_input(
-    somewhere: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr("uavexp.trial.fly_trial", failing(0, WorldError("the start lies inside an obstacle")))
-    assert main([*TINY, "seed=0", "out=run"]) == 2
-    assert capsys.readouterr().err == "error: the start lies inside an obstacle\n"
+def test_bad_input_that_shows_only_in_flight_is_still_bad_input(somewhere: Path) -> None:
+    done = run(*FAULTY, "trigger.deed=raise_bad_input", "out=run", cwd=somewhere, UAVEXP_TRUST="tests")
+    assert done.returncode == 2
+    assert done.stderr == "error: no such device\n"
     assert not list(somewhere.iterdir())
 
 
-def test_new_folders_are_numbered_and_hold_no_clock(somewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("uavexp.trial.fly_trial", failing(0, RuntimeError("x")))
+def test_new_folders_are_numbered_and_hold_no_clock(somewhere: Path) -> None:
     for _ in range(2):
-        assert main([*TINY, "seed=0"]) == 1
+        assert main([*TINY, "seed=0", "mission.time_base_s=1.0", "mission.time_per_path_spm=0.2"]) == 0
     names = sorted(item.name for item in (somewhere / "outputs").iterdir())
     assert names == ["0001-mcr-random_columns", "0002-mcr-random_columns"]
 

@@ -25,12 +25,12 @@ def metric(seed: int, size: int) -> Float:
 @given(seed=seeds, size=sizes)
 def test_a_closed_tour_visits_each_node_once_and_beats_the_order_of_numbers(seed: int, size: int) -> None:
     cost = metric(seed, size)
-    tour = closed_tour(cost, seed=seed, kicks_per_node=1)
+    tour = closed_tour(cost, seed=seed, kicks=50)
     assert sorted(tour) == list(range(size))
     assert tour[0] == 0
-    assert np.array_equal(tour, closed_tour(cost, seed=seed, kicks_per_node=1))
+    assert np.array_equal(tour, closed_tour(cost, seed=seed, kicks=50))
     if size > 4:
-        best = min(tour_length(cost, np.array(p), closed=True) for p in (range(size), reversed(range(size))))
+        best = tour_length(cost, np.arange(size), closed=True)
         assert tour_length(cost, tour, closed=True) <= best
 
 
@@ -38,7 +38,7 @@ def test_a_closed_tour_visits_each_node_once_and_beats_the_order_of_numbers(seed
 @given(seed=seeds, size=st.integers(2, 40), fixed=st.booleans())
 def test_an_open_tour_keeps_its_ends(seed: int, size: int, fixed: bool) -> None:
     end = size - 1 if fixed else None
-    order = open_tour(metric(seed, size), end, kicks_per_node=1)
+    order = open_tour(metric(seed, size), end, kicks=50)
     assert sorted(order) == list(range(size))
     assert order[0] == 0
     assert not fixed or order[-1] == size - 1
@@ -54,5 +54,5 @@ def test_small_open_tours_are_the_shortest(seed: int, size: int, fixed: bool) ->
         for end in ends
         for middle in itertools.permutations(sorted(set(range(1, size)) - {end}))
     )
-    found = tour_length(cost, open_tour(cost, size - 1 if fixed else None), closed=False)
+    found = tour_length(cost, open_tour(cost, size - 1 if fixed else None, kicks=300), closed=False)
     assert found <= best + 1e-9

@@ -127,7 +127,7 @@ def test_a_mover_that_stops_is_given_back_to_the_map() -> None:
         if scan.time_s == pytest.approx(3.9):
             assert len(tracks) == 1, "a track until the map has it"
     assert taken[18] > 0
-    assert not any(taken[35:])
+    assert not any(taken[40:]), "standing is told a second or two after it stopped"
 
 
 def test_the_map_of_a_moment_ago_still_tells_a_mover() -> None:

@@ -24,7 +24,7 @@ def apart(points: Float) -> Float:
 def test_a_ring_is_visited_round() -> None:
     angle = np.random.default_rng(100).permutation(200) * 2.0 * np.pi / 200
     cost = apart(np.stack([np.cos(angle), np.sin(angle)], axis=1))
-    length = tour_length(cost, closed_tour(cost, kicks_per_node=1), closed=True)
+    length = tour_length(cost, closed_tour(cost, kicks=50), closed=True)
     assert length == pytest.approx(400.0 * np.sin(np.pi / 200))
 
 
@@ -107,6 +107,20 @@ def test_runs_that_become_neighbours_are_joined() -> None:
         ((0, 2), (1, 3, 4)),
         ((2, 0), (1, 3, 4)),
     )
+
+
+def test_the_cheapest_merge_comes_first_and_its_cost_is_exact() -> None:
+    rng = np.random.default_rng(105)
+    for _ in range(20):
+        segment, cost, start = rng.integers(0, 6, 40), apart(rng.random((40, 2))), rng.random(40)
+        before = runs.clusters_of(rng.permutation(40), segment)
+        after = runs.merged(before, segment, cost, start, 3)
+        assert sorted(v for run in after for v in run) == list(range(40))
+        assert runs.switches(after) < runs.switches(before)
+        limit = 1.1 * runs.visit_length_m(before, cost, start)
+        kept = runs.merged(before, segment, cost, start, 3, limit)
+        assert runs.visit_length_m(kept, cost, start) <= limit + 1e-9
+        assert runs.switches(after) <= runs.switches(kept) <= runs.switches(before)
 
 
 def test_a_merge_beyond_the_limit_is_left_undone() -> None:

@@ -17,8 +17,8 @@ from uavexp.inspection.visibility import (
     Views,
     is_clear,
     sighted_cells,
-    visible_cells,
     views_of,
+    visible_cells,
     witnesses,
 )
 

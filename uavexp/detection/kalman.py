@@ -20,6 +20,7 @@ import numpy as np
 from uavexp.types import Float
 
 _H = np.eye(3, 6)
+_UPRIGHT = 0.1  # q upwards over q level: little that moves in a building climbs or sinks all of a sudden
 _EXPECTED = 3.0  # of the normalised innovation squared of a position
 
 
@@ -30,9 +31,9 @@ class Motion(NamedTuple):
     height_noise_m: float = 0.25  # the same upwards, where the part in sight varies most
     speed_mps: float = 1.0  # standard deviation per level axis of a velocity nothing is known of
     climb_mps: float = 0.3  # the same upwards
-    acceleration_density: float = 0.5  # q, m²/s³
+    acceleration_density: float = 0.1  # q of the level axes, m²/s³
     adaptivity: float = 20.0  # q is raised at most so many times; 1: never
-    fading: float = 0.6  # share of the average innovation that is kept at an observation
+    fading: float = 0.3  # share of the average innovation that is kept at an observation
 
 
 @lru_cache(maxsize=64)
@@ -43,6 +44,7 @@ def _step(period_s: float) -> tuple[Float, Float]:
     noise[:3, :3] = period_s**3 / 3.0 * np.eye(3)
     noise[:3, 3:] = noise[3:, :3] = period_s**2 / 2.0 * np.eye(3)
     noise[3:, 3:] = period_s * np.eye(3)
+    noise[[2, 5]] *= _UPRIGHT
     return transition, noise
 
 

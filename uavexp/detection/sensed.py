@@ -38,7 +38,7 @@ class Sensed:
 
     free_m: float = 0.2
     memory_s: float = 0.5
-    cluster_m: float = 0.35
+    cluster_m: float = 0.6
     min_points: int = 3
     max_size_m: float = 2.5
     gate: float = 4.0
@@ -50,7 +50,7 @@ class Sensed:
     max_speed_mps: float = 6.0
     max_deviation_m: float = 2.0
     position_noise_m: float = 0.08
-    acceleration_density: float = 0.5
+    acceleration_density: float = 0.1
     adaptivity: float = 20.0
     _tracker: Tracker | None = field(init=False, repr=False, default=None)
     _time_s: float = field(init=False, repr=False, default=np.nan)

@@ -19,7 +19,7 @@ from uavexp.types import Float, Int
 Clusters = tuple[tuple[int, ...], ...]  # viewpoints of each cluster, in the order of visit
 
 SWEEPS = 3  # of the reordering over all clusters: each changes the ends its neighbours see
-REORDER_KICKS = 2  # per viewpoint of a cluster
+REORDER_KICKS = 10  # per viewpoint of a cluster
 
 
 def clusters_of(order: Int, segment: Int) -> Clusters:
@@ -40,7 +40,8 @@ def merged(
 ) -> Clusters:
     """Clusters smaller than `size` merged into the nearest run of their segment (MergeOutlier).
 
-    Smallest first, then earliest. Runs that become neighbours by it are joined too.
+    The merge that lengthens the visit least comes first. Runs that become neighbours by it are
+    joined too.
 
     Args:
         clusters: runs in the order of visit.
@@ -50,36 +51,55 @@ def merged(
         size: tau.
         limit_m: length of the visit that no merge may exceed.
     """
+    length_m = visit_length_m(clusters, cost, start)
     while True:
-        small = sorted((len(run), place) for place, run in enumerate(clusters) if len(run) < size)
-        tried = (_merged_at(clusters, place, segment, cost) for _, place in small)
-        better = next((t for t in tried if t is not None and visit_length_m(t, cost, start) <= limit_m), None)
-        if better is None:
+        pairs = _pairs(clusters, segment, size)
+        added = [_lengthening_m(clusters, *pair, cost, start) for pair in pairs]
+        if not added or length_m + min(added) > limit_m:
             return clusters
-        clusters = better
+        goes, stays = pairs[int(np.argmin(added))]
+        length_m += min(added)
+        runs = list(clusters)
+        runs[stays] = clusters[min(goes, stays)] + clusters[max(goes, stays)]
+        del runs[goes]
+        clusters = _joined(runs, segment)
 
 
-def _merged_at(clusters: Clusters, place: int, segment: Int, cost: Float) -> Clusters | None:
-    """The clusters with the run at a place and the nearest of its segment made one; None: it has none."""
-    pair = _pair(clusters, place, segment, cost)
-    if pair is None:
-        return None
-    first, second = pair
-    stays, goes = (first, second) if len(clusters[first]) >= len(clusters[second]) else (second, first)
-    runs = list(clusters)
-    runs[stays] = clusters[first] + clusters[second]
-    del runs[goes]
-    return _joined(runs, segment)
+def _pairs(clusters: Clusters, segment: Int, size: int) -> list[tuple[int, int]]:
+    """Places (goes, stays) of runs next to each other in one segment, one of them smaller than `size`."""
+    latest: dict[int, int] = {}
+    pairs = []
+    for place, run in enumerate(clusters):
+        before = latest.get(int(segment[run[0]]))
+        latest[int(segment[run[0]])] = place
+        if before is not None and min(len(run), len(clusters[before])) < size:
+            smaller_first = len(clusters[before]) < len(run)
+            pairs.append((before, place) if smaller_first else (place, before))
+    return pairs
 
 
-def _pair(runs: Clusters, place: int, segment: Int, cost: Float) -> tuple[int, int] | None:
-    """Places of a run and of the nearest other run of its segment before or behind it, in order."""
-    own = segment[runs[place][0]]
-    before = next((n for n in range(place - 1, -1, -1) if segment[runs[n][0]] == own), None)
-    behind = next((n for n in range(place + 1, len(runs)) if segment[runs[n][0]] == own), None)
-    pairs = [(place, behind)] if behind is not None else []
-    pairs += [(before, place)] if before is not None else []
-    return min(pairs, key=lambda two: float(cost[np.ix_(runs[two[0]], runs[two[1]])].min()), default=None)
+def _lengthening_m(clusters: Clusters, goes: int, stays: int, cost: Float, start: Float) -> float:
+    """What the visit grows by when one run moves next to another, before or behind it as it came, m."""
+
+    def leg(here: int | None, there: int | None) -> float:
+        if there is None:
+            return 0.0
+        return float(start[there] if here is None else cost[here, there])
+
+    def last_before(place: int) -> int | None:
+        return clusters[place - 1][-1] if place > 0 else None
+
+    def first_after(place: int) -> int | None:
+        return clusters[place + 1][0] if place + 1 < len(clusters) else None
+
+    first, last = clusters[goes][0], clusters[goes][-1]
+    here, there = last_before(goes), first_after(goes)
+    saved = leg(here, first) + leg(last, there) - leg(here, there)
+    if goes > stays:
+        here, there = clusters[stays][-1], first_after(stays)
+    else:
+        here, there = last_before(stays), clusters[stays][0]
+    return leg(here, first) + leg(last, there) - leg(here, there) - saved
 
 
 def _joined(runs: list[tuple[int, ...]], segment: Int) -> Clusters:
@@ -149,7 +169,7 @@ def _shortest_way(run: Int, cost: Float, enter: Float, leave: Float | None) -> I
     if leave is not None:
         whole[-1, 1:-1] = whole[1:-1, -1] = leave
         whole[0, -1] = whole[-1, 0] = 2.0 * float(whole.max())
-    order = open_tour(whole, None if leave is None else count + 1, kicks_per_node=REORDER_KICKS)
+    order = open_tour(whole, None if leave is None else count + 1, kicks=REORDER_KICKS * count)
     if tour_length(whole, order, closed=False) >= tour_length(whole, np.arange(count + ends), closed=False):
         return run
     return np.asarray(run[order[1 : count + 1] - 1])

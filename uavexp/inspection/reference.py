@@ -196,7 +196,7 @@ def _samples(corners: Float, spacing: float) -> tuple[Float, Float]:
     for f in range(corners.shape[0]):
         first, longest = 0, -1.0
         for n in range(3):
-            length = np.linalg.norm(corners[f, (n + 1) % 3] - corners[f, n])
+            length = np.sqrt(((corners[f, (n + 1) % 3] - corners[f, n]) ** 2).sum())
             if length > longest:
                 first, longest = n, length
         a, b, c = corners[f, first], corners[f, (first + 1) % 3], corners[f, (first + 2) % 3]
@@ -225,7 +225,9 @@ def _gather(points: Float, area: Float, key: Int) -> tuple[Float, Float]:
     order = np.lexsort((*points.T, owner))  # sums do not depend on the order of the points
     total = np.zeros((count.shape[0], 3))
     np.add.at(total, owner[order], points[order])
-    return total / count[:, None], np.bincount(owner[order], area[order], minlength=count.shape[0])
+    return total / count[:, None], np.bincount(owner[order], area[order], minlength=count.shape[0]).astype(
+        np.float64
+    )
 
 
 def _coarser(faces: Surface, origin: Float, cell_m: float) -> Surface:
@@ -247,6 +249,6 @@ def _coarser(faces: Surface, origin: Float, cell_m: float) -> Surface:
     return Surface(
         point_m=mean(faces.point_m),
         normal=normal / np.linalg.norm(normal, axis=1)[:, None],
-        area_m2=np.bincount(owner, faces.area_m2),
+        area_m2=np.bincount(owner, faces.area_m2).astype(np.float64),
         curvature=mean(faces.curvature[:, None])[:, 0],
     )

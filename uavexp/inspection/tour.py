@@ -20,20 +20,20 @@ import numpy as np
 
 from uavexp.errors import UavexpError, require
 from uavexp.inspection import tour_array, tour_kernels, tsplib
-from uavexp.types import Float, Int
+from uavexp.types import Float, Int, Int32
 
 NEIGHBOURS = 8  # length of the neighbour lists
 KICKS_PER_NODE = 20
 LEAST_KICKS = 5000
 
 
-def closed_tour(cost: Float, seed: int = 0, kicks_per_node: int = KICKS_PER_NODE) -> Int:
+def closed_tour(cost: Float, seed: int = 0, kicks: int | None = None) -> Int:
     """Nodes (N,) of a short closed tour, node 0 first.
 
     Args:
         cost: symmetric travel costs (N, N), finite.
         seed: of the kicks.
-        kicks_per_node: budget of the search; at least `LEAST_KICKS` are tried in all.
+        kicks: budget of the search; None: `KICKS_PER_NODE`, `LEAST_KICKS` at least.
 
     Raises:
         ConfigError: the costs are no finite symmetric matrix.
@@ -47,17 +47,15 @@ def closed_tour(cost: Float, seed: int = 0, kicks_per_node: int = KICKS_PER_NODE
         return min(tours, key=lambda order: tour_length(cost, order, closed=True))
     near = tour_array.nearest(cost, min(NEIGHBOURS, nodes - 1))
     start = tour_array.nearest_neighbour_tour(cost, 0)
-    kicks = max(LEAST_KICKS, kicks_per_node * nodes)
-    tour = tour_kernels.search(cost, near, start, kicks, np.random.default_rng(seed))
+    budget = max(LEAST_KICKS, KICKS_PER_NODE * nodes) if kicks is None else kicks
+    tour: Int32 = tour_kernels.search(cost, near, start, budget, np.random.default_rng(seed))
     tour = np.roll(tour, -int(np.argmin(tour)))
     if tour[-1] < tour[1]:  # one of the two directions, always the same
         tour[1:] = tour[:0:-1].copy()
-    return tour.astype(np.int64)
+    return np.asarray(tour, dtype=np.int64)
 
 
-def open_tour(
-    cost: Float, end: int | None = None, seed: int = 0, kicks_per_node: int = KICKS_PER_NODE
-) -> Int:
+def open_tour(cost: Float, end: int | None = None, seed: int = 0, kicks: int | None = None) -> Int:
     """Nodes (N,) of a short path through all nodes that begins at node 0.
 
     Closed by a dummy node next to the start: joined to it at a cost so low that no search
@@ -67,7 +65,7 @@ def open_tour(
         cost: symmetric travel costs (N, N), finite.
         end: last node; None: any.
         seed: of the kicks.
-        kicks_per_node: budget of the search.
+        kicks: budget of the search; None: as `closed_tour`.
 
     Raises:
         ConfigError: the costs are no finite symmetric matrix, or the end is no other node.
@@ -83,7 +81,7 @@ def open_tour(
     closed[0, nodes] = closed[nodes, 0] = bond
     if end is not None:
         closed[end, nodes] = closed[nodes, end] = bond
-    tour = closed_tour(closed, seed, kicks_per_node)  # 0 first: the dummy is second or last
+    tour = closed_tour(closed, seed, kicks)  # 0 first: the dummy is second or last
     return tour[:-1] if tour[-1] == nodes else np.append(0, tour[:1:-1])
 
 

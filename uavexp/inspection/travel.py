@@ -76,7 +76,7 @@ def lattice_of(
     pairs = _edges(field, number, position, clearance_m)
     part = _part_of(position, pairs, start_m, 3.0 * max(cell_m, layer_m))
     renumbered = np.cumsum(part, dtype=np.int32) - 1
-    pairs = renumbered[pairs[part[pairs[:, 0]]]]
+    pairs = renumbered[pairs[part[pairs[:, 0]]]].astype(np.int64)
     position = position[part]
     number[passable] = np.where(part, renumbered, -1)
     unit = float(np.linalg.norm(step)) / _UNITS
@@ -106,7 +106,7 @@ def _edges(field: DistanceField, number: Int32, position: Float, clearance_m: fl
             count = number.shape[axis]
             here.append(slice(max(-shift, 0), count - max(shift, 0)))
             there.append(slice(max(shift, 0), count - max(-shift, 0)))
-        pair = np.stack([number[tuple(here)].ravel(), number[tuple(there)].ravel()], axis=1)
+        pair = np.stack([number[tuple(here)].ravel(), number[tuple(there)].ravel()], axis=1).astype(np.int64)
         pair = pair[(pair >= 0).all(axis=1)]
         halfway = 0.5 * (position[pair[:, 0]] + position[pair[:, 1]])
         found.append(pair[field.distance_m(halfway) >= clearance_m])
@@ -173,7 +173,7 @@ def travel_lengths(lattice: Lattice, from_m: Float, to_m: Float) -> Float:
         from_m,
         to_m,
     )
-    return np.minimum(over, straight)
+    return np.asarray(np.minimum(over, straight))
 
 
 def travel_matrix(lattice: Lattice, points_m: Float) -> Float:

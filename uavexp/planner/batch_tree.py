@@ -210,16 +210,20 @@ def _expand(
     """Put the edges from a vertex that may better a solution into the heap."""
     only_new = tree.expanded_cost[tail] <= tree.cost[tail]  # the others were tried at this cost before
     tree.expanded_cost[tail], tree.expanded_batch[tail] = tree.cost[tail], batch
-    best = tree.cost[GOAL]
+    best, here, paid = tree.cost[GOAL], tree.state[tail], tree.cost[tail]
     for n in range(neighbours_within(cells, tree.state, tail, near)):
         head = near[n]
         if head in (tail, START) or (only_new and tree.born[head] != batch):
             continue
-        least = tree.cost[tail] + bound(rule, tree.state[tail], tree.state[head])
-        if least >= tree.cost[head] or least + tree.to_goal[head] >= best:
+        if paid >= tree.cost[head]:
             continue
-        step = cost(rule, tree.state[tail], tree.state[head])
-        there = tree.cost[tail] + step
+        step = bound(rule, here, tree.state[head])
+        there = paid + step
+        if there >= tree.cost[head] or there + tree.to_goal[head] >= best:
+            continue
+        if rule.kinodynamic:
+            step = cost(rule, here, tree.state[head])
+            there = paid + step
         if there < tree.cost[head] and there + tree.to_goal[head] < best and fits(tree, tail, head, rule):
             heapq.heappush(queue, (there + tree.to_goal[head], tail, head, step))
 

@@ -20,7 +20,6 @@ All budgets are iterations; the answer depends on the request and nothing else.
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -31,28 +30,23 @@ import numpy as np
 from uavexp.errors import require, require_non_negative, require_option, require_positive
 from uavexp.geometry import evaluate, sample_times
 from uavexp.planner.brake import braking_trajectory, stopping_distance_m
-from uavexp.planner.free_space import FreeSpace, free_space, straight_is_free
+from uavexp.planner.free_space import straight_is_free
 from uavexp.planner.smoothing.base import SmoothResult
 from uavexp.planner.smoothing.basis import Basis, make_basis, to_trajectory
-from uavexp.planner.smoothing.clearance import shortcut, shortfall
+from uavexp.planner.smoothing.clearance import shortfall
 from uavexp.planner.smoothing.corridor import make_corridor
+from uavexp.planner.smoothing.course import TANGENT_M, Task, at_shares, course, space_of
 from uavexp.planner.smoothing.quadratic import NO_CUTS, Problem, solve
 from uavexp.planner.spline import join
-from uavexp.planner.timing import STEP_M, resample, smooth, time_profile
+from uavexp.planner.timing import STEP_M, resample
 from uavexp.types import Float, Limits, PlanRequest, PlanStatus, Trajectory
 
 FEWEST_SPANS, MOST_SPANS = 6, 60
 _START_EXCESS = 1.1  # a start beyond a limit by more than this factor is refused
-_RESERVE_M = 0.1  # clearance of straight ways above the limit: room to round their corners
-_SMOOTHING_ROUNDS = 10  # of the path that is timed: takes its corners and staircase out
-_TANGENT_M = 1.0  # length over which the path's first and last direction is taken
 _SHORTEST_S = 0.2  # of a trajectory to where the vehicle is
 _STRETCH = 1.08  # of a duration that is too short
-_STRETCHES_AT_REST, _STRETCHES_MOVING = (
-    14,
-    5,
-)  # a longer duration helps a moving start less than braking first
-_SWERVES = (1.0, 2.0)  # decelerations tried, as shares of the limit, of a velocity that is off the path
+_STRETCHES_AT_REST = 14  # tried at most
+_STRETCHES_MOVING = 5  # braking first helps a moving start more than a long duration
 _ROUNDS = 12  # QPs at most for one duration
 _REST_MPS = 0.05  # a slower start counts as standing
 _CHECK_VOXELS = 0.25
@@ -82,24 +76,6 @@ class Rung(NamedTuple):
 
 
 LADDER = (Rung(1.0, True, True), Rung(1.6, True, False), Rung(2.0, False, False))
-
-
-class Timed(NamedTuple):
-    """A path with the times at which it is passed."""
-
-    points: Float  # (P, 3)
-    times: Float  # (P,) s from the start, increasing
-
-
-class Task(NamedTuple):
-    """What is to be smoothed, and within what."""
-
-    request: PlanRequest
-    path: Float  # (P, 3)
-    times: Float | None
-    limits: Limits
-    min_clearance: float
-    known_only: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -156,14 +132,14 @@ class BsplineSmoother:
         end[0] = request.goal.position_m
         if rung.moving_end and not request.goal.is_target:
             end[1] = self._end_velocity(task)
-        timed = _timed(task, rung, float(np.linalg.norm(end[1])))
-        duration = max(self.duration_margin * float(timed.times[-1]), _SHORTEST_S)
+        way = course(task, float(np.linalg.norm(end[1])), rung.straight)
+        duration = max(self.duration_margin * float(way.times[-1]), _SHORTEST_S)
         order = self.derivative.order
         spans = min(max(round(rung.finer * duration / self.span_s), FEWEST_SPANS), MOST_SPANS)
         basis = make_basis(order + 1, spans, order)
         corridor = make_corridor(
             request.field,
-            _at_shares(timed, np.linspace(0.0, 1.0, spans + 1)),
+            at_shares(way, np.linspace(0.0, 1.0, spans + 1)),
             request.flight_bounds_m,
             task.min_clearance,
             task.known_only,
@@ -172,7 +148,7 @@ class BsplineSmoother:
             return SmoothResult(status=PlanStatus.NOT_CLEAR, reason="the path meets an obstacle")
         start = np.stack([request.position_m, request.velocity_mps, request.acceleration_mps2])
         top, most = _allowed(start, limits, duration / spans)
-        guess = _at_shares(timed, _greville(basis))
+        guess = at_shares(way, _greville(basis))
         problem = Problem(basis, corridor, guess, start, end, top, most)
         h, cuts, solves = duration / spans, NO_CUTS, 0
         moving = float(np.linalg.norm(request.velocity_mps)) > _REST_MPS
@@ -212,7 +188,7 @@ class BsplineSmoother:
     def _end_velocity(self, task: Task) -> Float:
         """Velocity (3,) along the path's end that can be stopped from on clear ground, else zero."""
         request, path = task.request, resample(task.path, STEP_M)
-        along = path[-1] - path[max(len(path) - 1 - round(_TANGENT_M / STEP_M), 0)]
+        along = path[-1] - path[max(len(path) - 1 - round(TANGENT_M / STEP_M), 0)]
         length = float(np.linalg.norm(along))
         if length < 1e-6:
             return np.zeros(3)
@@ -220,7 +196,7 @@ class BsplineSmoother:
         travel_m = STEP_M * (len(path) - 1)
         reachable = math.sqrt(start**2 + task.limits.max_acceleration_mps2 * travel_m)
         speed = min(self.end_speed_mps, 0.9 * task.limits.max_speed_mps, reachable)
-        space = _space(task, 0.0)
+        space = space_of(task, 0.0)
         for share in (1.0, 0.7, 0.4):
             velocity: Float = share * speed / length * along
             beyond = path[-1] + stopping_distance_m(share * speed, task.limits) / length * along
@@ -293,70 +269,6 @@ def _allowed(start: Float, limits: Limits, h: float) -> tuple[float, float]:
     # acceleration is continuous and turns within a span
     unavoidable = fast + rising**2 * h / (2.0 * (rising + limits.max_acceleration_mps2))
     return max(limits.max_speed_mps, unavoidable), max(limits.max_acceleration_mps2, strong)
-
-
-def _space(task: Task, reserve_m: float) -> FreeSpace:
-    """Free space for the way from start to goal, at so much more than the clearance asked for."""
-    request = task.request
-    return free_space(
-        request.field,
-        np.stack([request.position_m, request.goal.position_m]),
-        request.flight_bounds_m,
-        task.min_clearance + reserve_m,
-        math.inf,
-        task.known_only,
-    )
-
-
-def _timed(task: Task, rung: Rung, end_mps: float) -> Timed:
-    """The path with its times: those it came with, or the time-optimal traversal from this start."""
-    if task.times is not None and rung.straight:
-        return Timed(task.path, task.times)
-    points = shortcut(resample(task.path, STEP_M), _space(task, _RESERVE_M)) if rung.straight else task.path
-    raw = resample(points, STEP_M)
-    path = smooth(raw, _SMOOTHING_ROUNDS)
-    velocity, limits = task.request.velocity_mps, task.limits
-    ahead = path[min(round(_TANGENT_M / STEP_M), len(path) - 1)] - path[0]
-    length = float(np.linalg.norm(ahead))
-    ahead = ahead / length if length > 1e-9 else np.zeros(3)
-    along = float(velocity @ ahead)
-    aside = velocity - max(along, 0.0) * ahead
-    fastest = (limits.max_speed_mps, limits.max_acceleration_mps2)
-    times = time_profile(path, max(along, 0.0), end_mps, *fastest)
-    # a vehicle moving away needs v/a to stop and sqrt(2) v/a to come back
-    across = float(np.linalg.norm(aside + max(-along, 0.0) * ahead))
-    lost = (across + (1.0 + math.sqrt(2.0)) * max(-along, 0.0)) / limits.max_acceleration_mps2
-    total = float(times[-1])
-    times = times * ((total + lost) / total) if total > 0.0 else times + lost
-    for harder in _SWERVES:
-        swerved = _swerved(raw, times, aside, harder * limits.max_acceleration_mps2)
-        if _is_free(swerved, task):
-            return Timed(swerved, times)
-    return Timed(raw, times)
-
-
-def _swerved(points: Float, times: Float, aside_mps: Float, max_acceleration_mps2: float) -> Float:
-    """The points where a vehicle would be that begins with a velocity off the path and returns to it.
-
-    The offset t (1 - t / d)² times that velocity has the deceleration 4 v / d at the start.
-    """
-    duration = 4.0 * float(np.linalg.norm(aside_mps)) / max_acceleration_mps2
-    if duration == 0.0:
-        return points
-    offset = times * np.maximum(1.0 - times / duration, 0.0) ** 2
-    return np.asarray(points + offset[:, None] * aside_mps)
-
-
-def _is_free(points: Float, task: Task) -> bool:
-    """Whether the polyline (P, 3) is clear."""
-    space = _space(task, 0.0)
-    return all(straight_is_free(space, a, b)[0] for a, b in itertools.pairwise(points))
-
-
-def _at_shares(timed: Timed, shares: Float) -> Float:
-    """Points (S, 3) of a timed path at shares (S,) of its duration."""
-    at = shares * timed.times[-1]
-    return np.stack([np.interp(at, timed.times, timed.points[:, axis]) for axis in range(3)], axis=1)
 
 
 def _greville(basis: Basis) -> Float:

@@ -11,6 +11,8 @@ pulled into the corner by halves.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numba as nb
 import numpy as np
 
@@ -117,7 +119,7 @@ def _corner(free: Bool, before: Float, corner: Float, after: Float) -> Float:
     for _ in range(_HALVINGS):
         first, last = corner + share * (before - corner), corner + share * (after - corner)
         arc = (1.0 - u) ** 2 * first + 2.0 * u * (1.0 - u) * corner + u**2 * last
-        if all(in_sight(free, a, b) for a, b in zip(arc[:-1], arc[1:], strict=True)):
+        if all(in_sight(free, a, b) for a, b in pairwise(arc)):
             return np.asarray(arc)
         share *= 0.5
     return corner[None]
