@@ -40,7 +40,7 @@ class Pattern:
 
     stand_off_m: float = 1.8
     overlap: float = 0.3
-    least_new_m2: float = 0.1
+    least_new_m2: float = 0.06
 
     def __post_init__(self) -> None:
         require_positive(stand_off_m=self.stand_off_m, least_new_m2=self.least_new_m2)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from uavexp.metrics import clearance, path, plan, replanning, smoothness, tracking, tracking_movers
+from uavexp.metrics import clearance, coverage, path, plan, replanning, smoothness, tracking, tracking_movers
 from uavexp.types import Outcome, TrialLog, World
 
 Metrics = dict[str, bool | int | float | str]
@@ -46,6 +46,7 @@ def evaluate(
         **plan.costs(log),
         "seen_share": float(log.seen_share),
         **tracking_movers.measures(log, near_miss_m),
+        **coverage.measures(log, world),
     }
 
 

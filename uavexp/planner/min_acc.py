@@ -40,7 +40,7 @@ from uavexp.mapping.base import DistanceField
 from uavexp.planner.brake import braking_trajectory
 from uavexp.planner.escape import safest_stop
 from uavexp.planner.optimise import CONTROL_POINTS, Settings, moving_obstacles, optimise, shortfall
-from uavexp.planner.search import PathSearch
+from uavexp.planner.search import Finder, PathSearch
 from uavexp.planner.spline import join, spline_model, to_trajectory
 from uavexp.types import Limits, PlanRequest, PlanResult, PlanStatus, Trajectory
 
@@ -143,9 +143,15 @@ class MinAcc:
 
     def plan(self, request: PlanRequest) -> PlanResult:
         """Return a trajectory or the reason why there is none (`Planner.plan`)."""
-        if self._settings is None or self._search is None or self._limits is None:
+        if self._search is None:
             raise RuntimeError("plan() needs reset() first")
-        settings, search, limits = self._settings, self._search, self._limits
+        return self.plan_along(request, self._search)
+
+    def plan_along(self, request: PlanRequest, search: Finder) -> PlanResult:
+        """`plan` with a path search of another planner in place of its own."""
+        if self._settings is None or self._limits is None:
+            raise RuntimeError("plan() needs reset() first")
+        settings, limits = self._settings, self._limits
         result = self._attempt(request, settings, search)
         if result.trajectory is None and len(moving_obstacles(request, settings)):
             return self._among_movers(request, settings, search, limits, result)
@@ -161,7 +167,7 @@ class MinAcc:
         self,
         request: PlanRequest,
         settings: Settings,
-        search: PathSearch,
+        search: Finder,
         limits: Limits,
         failed: PlanResult,
     ) -> PlanResult:
@@ -174,7 +180,7 @@ class MinAcc:
         reason = "steps aside first" if aside else "brakes first"
         return self._stop_first(request, stop, closer, search, result, reason)
 
-    def _attempt(self, request: PlanRequest, settings: Settings, search: PathSearch) -> PlanResult:
+    def _attempt(self, request: PlanRequest, settings: Settings, search: Finder) -> PlanResult:
         """Search and optimise once."""
         began = time.perf_counter()
         goal_m = request.goal.position_m
@@ -198,7 +204,7 @@ class MinAcc:
             status=status,
             trajectory=trajectory,
             path_m=found.path_m,
-            reason=reason,
+            reason=reason or found.reason,
             iterations=iterations,
             expansions=found.expansions,
             wall_search_s=searched - began,
@@ -210,7 +216,7 @@ class MinAcc:
         request: PlanRequest,
         stop: Trajectory,
         settings: Settings,
-        search: PathSearch,
+        search: Finder,
         failed: PlanResult,
         reason: str,
     ) -> PlanResult:

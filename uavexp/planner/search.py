@@ -18,6 +18,7 @@ inflation that breaks ties towards the goal).
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numba as nb
 import numpy as np
@@ -262,6 +263,14 @@ class FoundPath:
     cost_m: float  # penalised length from the start's voxel to the goal's; inf unless OK
     expansions: int  # of columns and of cells
     reason: str = ""
+
+
+class Finder(Protocol):
+    """Anything that finds a path on a distance field."""
+
+    def find(self, field_: DistanceField, start_m: Float, goal_m: Float, bounds_m: Float) -> FoundPath:
+        """Return a path from start (3,) to goal (3,) within the bounds (2, 3), or why there is none."""
+        ...
 
 
 @dataclass(slots=True, kw_only=True)

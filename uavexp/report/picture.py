@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from uavexp.metrics import replanning
-from uavexp.report import page, plan_view, style
+from uavexp.report import inspection_view, page, plan_view, style
 from uavexp.types import TrialLog, World
 
 if TYPE_CHECKING:
@@ -44,11 +44,17 @@ def draw(world: World, log: TrialLog, metrics: Values, title: str, path: Path | 
         size_m = view[1] - view[0]
         sheet = page.lay_out((float(size_m[0]), float(size_m[1])))
         FigureCanvasAgg(sheet.figure)
-        speed_scale = plan_view.draw(sheet.plan, world, log, view)
+        inspects = inspection_view.is_inspection(log)
+        draw_plan = inspection_view.draw if inspects else plan_view.draw
+        speed_scale = draw_plan(sheet.plan, world, log, view)
         _draw_speed_bar(sheet.speed_bar, speed_scale)
         _draw_clearance(sheet.clearance, log, _number(metrics, "safety_threshold_m"))
-        _draw_tracking(sheet.tracking, log)
-        _draw_legend(sheet, world, log)
+        if inspects:
+            inspection_view.draw_coverage(sheet.tracking, log)
+            _finish_panel(sheet.tracking, log, legend=False)
+        else:
+            _draw_tracking(sheet.tracking, log)
+        _draw_legend(sheet, inspection_view.handles(world, log) if inspects else _handles(world, log))
         _draw_header(sheet, world, log, metrics, title)
         sheet.figure.savefig(path, dpi=DPI, format="png", metadata={"Software": None})
 
@@ -124,9 +130,9 @@ def _finish_panel(axes: Axes, log: TrialLog, *, legend: bool = True) -> None:
         )
 
 
-def _draw_legend(sheet: page.Page, world: World, log: TrialLog) -> None:
+def _handles(world: World, log: TrialLog) -> list[Line2D | Patch]:
     low_m, high_m = plan_view.band_m(world)
-    handles = [
+    return [
         Line2D([], [], color=plan_view.SPEED_COLOURS(0.7), lw=2.2, label="flown"),
         Line2D([], [], color=style.BLACK, lw=0.9, ls="--", label="true shortest path (3D)"),
         Line2D([], [], color=style.SKY, lw=1.0, label="plans"),
@@ -139,6 +145,9 @@ def _draw_legend(sheet: page.Page, world: World, log: TrialLog) -> None:
         ),
         *_event_handles(log),
     ]
+
+
+def _draw_legend(sheet: page.Page, handles: list[Line2D | Patch]) -> None:
     sheet.figure.legend(
         handles=handles,
         loc="upper left",
@@ -189,7 +198,9 @@ def _draw_header(sheet: page.Page, world: World, log: TrialLog, metrics: Values,
     )
     head = f"{' · '.join(names)}: {ending}"
     sheet.figure.text(left, 1.0 - 0.23 / height_in, head, fontsize=12, fontweight="bold", va="center")
-    sheet.figure.text(left, 1.0 - 0.43 / height_in, _key_numbers(metrics), fontsize=9, va="center")
+    numbers = [inspection_view.key_numbers(log)] if inspection_view.is_inspection(log) else []
+    numbers.append(_key_numbers(metrics))
+    sheet.figure.text(left, 1.0 - 0.43 / height_in, "    ".join(numbers), fontsize=9, va="center")
     command = textwrap.shorten(title, 170, placeholder=" …")
     size = min(8.0, 8.0 * 150 / max(len(command), 1))
     sheet.figure.text(

@@ -41,7 +41,7 @@ def draw(axes: Axes, world: World, log: TrialLog, view: Float) -> Normalize:
     for replan in log.replans:
         points = replan.trajectory_m
         axes.plot(points[:, 0], points[:, 1], color=style.SKY, lw=0.6, alpha=0.6, zorder=3)
-    scale = _draw_path(axes, log)
+    scale = draw_path(axes, log)
     _draw_events(axes, log)
     draw_task(axes, world)
     frame(axes, view)
@@ -64,9 +64,14 @@ def _tick_m(extent_m: float) -> float:
 
 
 def visited_m(world: World, *logs: TrialLog) -> Float:
-    """Places (N, 3) known to be free: start, target, the shortest and the flown paths."""
-    ends = np.stack([world.start_m, world.target_m])
+    """Places (N, 3) known to be free: start, target, the shortest and the flown paths.
+
+    An inspection has no target, and a block may stand on the way there: its flown path alone.
+    """
     flown = [log.position_m.reshape(-1, 3) for log in logs]
+    if any(log.cell_m.size for log in logs):
+        return np.concatenate([world.start_m[None], *flown])
+    ends = np.stack([world.start_m, world.target_m])
     return np.concatenate([ends, world.shortest_path.reshape(-1, 3), *flown])
 
 
@@ -117,7 +122,7 @@ def _draw_mapped(axes: Axes, log: TrialLog, heights_m: tuple[float, float], view
     )
 
 
-def _draw_path(axes: Axes, log: TrialLog) -> Normalize:
+def draw_path(axes: Axes, log: TrialLog) -> Normalize:
     """Draw the flown path in the colours of its speed."""
     speed_mps = np.linalg.norm(log.velocity_mps.reshape(-1, 3), axis=1)
     scale = Normalize(0.0, max(0.5, math.ceil(2.0 * speed_mps.max(initial=0.0)) / 2.0))

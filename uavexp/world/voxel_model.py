@@ -17,8 +17,9 @@ def voxel_model(world: World, voxel_size_m: float, bounds_m: Float | None = None
     """Occupied voxels of a world: those that a surface enters, and all that air does not reach.
 
     Exact for the triangles (separating axes), but a voxel that a surface enters by less than a
-    thousandth of its size is free, and a surface between two voxels fills the upper. Air joins the start through faces of free
-    voxels, so the inside of a solid is occupied, and so is what lies behind a closed wall.
+    thousandth of its size is free, and a surface between two voxels fills the upper. Air is
+    what is joined with the start through faces of free voxels: the inside of a solid is
+    occupied, and so is what lies behind a closed wall.
 
     Args:
         world: its mesh and start.

@@ -52,6 +52,7 @@ class Follower:
         if tracked.motion is None:
             return Followed(None, tracked.slack_m, tracked.iterations)
         touching = replace(moving, margin_m=0.0)
+        strongest = self.static.settings.limits.max_acceleration_mps2
         best, most_m = None, -np.inf
         for steps in self._lengths(guide.spline.end_s - phase_s):
             head, state, end_s, meet_s = None, start, request.time_s, phase_s
@@ -59,7 +60,7 @@ class Follower:
                 head = to_trajectory(self.model, start, tracked.motion, steps, request.time_s)
                 state, end_s = state_at(head, head.end_s), head.end_s
                 meet_s = phase_of(guide.spline, state, phase_s)[0]
-            for way in rejoined(head, state, guide.spline, meet_s, end_s):
+            for way in rejoined(head, state, guide.spline, meet_s, end_s, strongest):
                 if not self._is_sound(request, way):
                     continue
                 room_m = least_room_m(touching, way, request.time_s)

@@ -12,6 +12,7 @@ from uavexp.planner.spline import join
 from uavexp.types import Float, Trajectory
 
 BLENDS_S = (0.5, 1.0, 2.0, 3.0)  # durations of the quintic, tried in turn
+_LOOKS = 12  # instants of a quintic that are looked at before all else
 _PACES = (1.0, 0.6)  # time on the spline that passes in the meantime, as a share of it
 
 
@@ -59,7 +60,12 @@ def _shifted(coefficients: Float, by_s: float) -> Float:
 
 
 def rejoined(
-    head: Trajectory | None, start: Float, spline: Trajectory, phase_s: float, now_s: float
+    head: Trajectory | None,
+    start: Float,
+    spline: Trajectory,
+    phase_s: float,
+    now_s: float,
+    max_acceleration_mps2: float,
 ) -> Iterator[Trajectory]:
     """Ways to fly on from a state: quintics to the spline, then the rest of it.
 
@@ -69,13 +75,22 @@ def rejoined(
         spline: to come back to.
         phase_s: time on the spline that belongs to the head's end.
         now_s: absolute time of the head's end.
+        max_acceleration_mps2: quintics that need more are left out.
     """
     for pace, duration_s in itertools.product(_PACES, BLENDS_S):
         meet_s = min(phase_s + pace * duration_s, spline.end_s)
         way = blend(start, state_at(spline, meet_s), now_s, duration_s)
+        if _strongest_mps2(way) > max_acceleration_mps2:
+            continue  # spares the check of the whole
         tail = rest_of(spline, meet_s, way.end_s)
         if tail is not None:
             way = join(way, tail)
         if head is not None:
             way = join(head, way)
         yield Trajectory(breaks_s=way.breaks_s, coefficients=way.coefficients, at_rest=spline.at_rest)
+
+
+def _strongest_mps2(way: Trajectory) -> float:
+    """Largest acceleration at a few instants behind the start."""
+    times = np.linspace(way.start_s, way.end_s, _LOOKS + 1)[1:]
+    return float(np.linalg.norm(evaluate(way, times)[2], axis=1).max())

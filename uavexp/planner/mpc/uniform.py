@@ -95,4 +95,5 @@ def to_trajectory(basis: Uniform, control: Float, h: float, start_s: float, at_r
     windows = np.stack([control[j : j + spans] for j in range(basis.degree + 1)], axis=1)
     scale = h ** np.arange(basis.degree + 1)[:, None]
     coefficients = np.einsum("ij,mjk->mik", basis.power, windows) / scale
-    return Trajectory(breaks_s=start_s + h * np.arange(spans + 1), coefficients=coefficients, at_rest=at_rest)
+    breaks: Float = start_s + h * np.arange(spans + 1.0)
+    return Trajectory(breaks_s=breaks, coefficients=coefficients, at_rest=at_rest)

@@ -1,0 +1,78 @@
+"""What an inspection has seen, and what it cost: figures of the cells and the viewpoints of its log."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from uavexp.geometry import polyline_length_m
+from uavexp.types import Bool, Float, Outcome, TrialLog, World
+
+
+def coverage(log: TrialLog) -> float:
+    """Share of all cells to be seen that were seen; NaN without any."""
+    return _share(np.isfinite(log.cell_seen_s))
+
+
+def coverage_visible(log: TrialLog) -> float:
+    """Share of those cells that can be seen from some place within reach; NaN without any."""
+    return _share(np.isfinite(log.cell_seen_s[log.cell_visible]))
+
+
+def over_time(log: TrialLog, times_s: Float) -> Float:
+    """Share of the visible cells seen by each time (T,) -> (T,); NaN without any."""
+    seen_s = np.sort(log.cell_seen_s[log.cell_visible])
+    if seen_s.size == 0:
+        return np.full(times_s.shape, np.nan)
+    return np.searchsorted(seen_s, times_s, side="right") / seen_s.size
+
+
+def unreachable(log: TrialLog) -> float:
+    """Viewpoints that were found blocked or out of reach; NaN when time was up before all were tried."""
+    return float(np.isinf(log.viewpoint_visited_s).sum()) if log.outcome is Outcome.INSPECTED else math.nan
+
+
+def segment_switches(log: TrialLog) -> int:
+    """How often two viewpoints in a row, as planned, look at different segments."""
+    return int(np.count_nonzero(np.diff(log.viewpoint_segment)))
+
+
+def tour_length_m(log: TrialLog, world: World) -> float:
+    """Length of straight lines from the start through the viewpoints as planned; NaN without any.
+
+    A lower bound of the tour that was planned, which goes around walls.
+    """
+    if log.viewpoint_m.shape[0] == 0:
+        return math.nan
+    return polyline_length_m(np.concatenate([world.start_m[None], log.viewpoint_m]))
+
+
+def scene_kind(log: TrialLog, world: World) -> str:
+    """What the reference map does not show: static (nothing), blocks, people, both; empty without a map."""
+    if world.reference is None:
+        return ""
+    known, true = world.reference.triangles, world.triangles
+    people, blocks = log.mover_shape.size > 0, not np.array_equal(known, true)
+    return {(False, False): "static", (True, False): "blocks", (False, True): "people"}.get(
+        (blocks, people), "both"
+    )
+
+
+def measures(log: TrialLog, world: World) -> dict[str, int | float | str]:
+    """All of them, as columns; of a flight without cells NaN, 0 and empty."""
+    visited = int(np.isfinite(log.viewpoint_visited_s).sum())
+    return {
+        "coverage": coverage(log),
+        "coverage_visible": coverage_visible(log),
+        "viewpoints": len(log.viewpoint_visited_s),
+        "visited": visited,
+        "unreachable": unreachable(log),
+        "segment_switches": segment_switches(log),
+        "tour_length_m": tour_length_m(log, world),
+        "scene_kind": scene_kind(log, world) if log.cell_m.size else "",
+    }
+
+
+def _share(seen: Bool) -> float:
+    return float(seen.mean()) if seen.size else math.nan

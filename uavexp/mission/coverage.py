@@ -1,0 +1,80 @@
+"""Which cells of the surface have really been seen, and which could be: asked of the true geometry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from uavexp.inspection.plan import sparse_places
+from uavexp.inspection.reference import Surface, reference_field
+from uavexp.inspection.travel import lattice_of
+from uavexp.inspection.visibility import Camera, Grid, visible_cells, witnesses
+from uavexp.scene import Scene
+from uavexp.types import Bool, Float, Int, World
+
+_NOTHING = Grid(np.zeros((1, 1, 1), dtype=np.uint8), np.zeros(3), 1e3)  # blocks no sight
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Coverage:
+    """When each cell was first seen, in truth.
+
+    Attributes:
+        surface: target cells (N,) of the reference map.
+        camera: that looks, level.
+        tolerance_m: a cell counts as seen when the true surface met on the line of sight lies
+            within this of the cell, along the cell's normal.
+        seen_s: (N,) first time seen; inf: not yet. Written by `look`.
+    """
+
+    surface: Surface
+    camera: Camera
+    tolerance_m: float
+    seen_s: Float
+
+    def look(self, scene: Scene, time_s: float, eye_m: Float, yaw_rad: float) -> None:
+        """Count what the camera sees now; movers block sight like everything else."""
+        waiting = np.flatnonzero(np.isinf(self.seen_s))
+        point, normal = self.surface.point_m[waiting], self.surface.normal[waiting]
+        framed = visible_cells(_NOTHING, self.camera.optics, eye_m, yaw_rad, point, normal)
+        met = is_met(scene, eye_m, point[framed], normal[framed], self.tolerance_m)
+        self.seen_s[waiting[framed[met]]] = time_s
+
+
+def is_met(scene: Scene, eye_m: Float, point_m: Float, normal: Float, tolerance_m: float) -> Bool:
+    """Whether lines of sight end at the cells (N,): the true surface is there and nothing is before it.
+
+    Args:
+        scene: the truth.
+        eye_m: (3,).
+        point_m: of the cells (N, 3).
+        normal: of the cells (N, 3).
+        tolerance_m: between cell and true surface, along the normal.
+    """
+    line = point_m - eye_m
+    length = np.linalg.norm(line, axis=1)
+    way = line / length[:, None]
+    eyes = np.broadcast_to(eye_m, way.shape)
+    hit = scene.cast(np.hstack([eyes, way]).astype(np.float32))[0].astype(np.float64)
+    return np.asarray(np.abs(hit - length) * -(way * normal).sum(axis=1) <= tolerance_m)
+
+
+def visible_anywhere(
+    world: World, scene: Scene, camera: Camera, surface: Surface, clearance_m: float, tolerance_m: float
+) -> Bool:
+    """Cells (N,) that exist in truth and are seen from some place that the vehicle can reach there.
+
+    Args:
+        world: the truth, its movers left out.
+        scene: of the same.
+        camera: that looks.
+        surface: target cells (N,).
+        clearance_m: of the places.
+        tolerance_m: between cell and true surface.
+    """
+    field = reference_field(world.vertices_m, world.triangles, world.bounds_m)
+    lattice = lattice_of(field, world.flight_bounds_m, world.start_m, clearance_m)
+    grid = Grid(field.state, field.origin_m, field.voxel_size_m)
+    witness: Int = witnesses(grid, camera.optics, sparse_places(lattice), surface.point_m, surface.normal)
+    return np.asarray((witness >= 0) & (scene.fixed_distance_m(surface.point_m) <= tolerance_m))

@@ -1,0 +1,104 @@
+"""Plain A*: the shortest 26-connected voxel path, exact, flown as a minimum-acceleration curve.
+
+This is what Liao et al. (paper 2) call the traditional method and do not define. It knows no
+direction, no height and no distance beyond the least clearance; movers block it where they
+are now ("current"), not where they will be. The search is `voxel.canonical`; path to
+trajectory is that of `min_acc`, with its default weights, so that what is flown compares.
+
+    python -m uavexp.planner.astar MAP.npz SCENARIOS.3dscen --limit 200
+
+solves problems of the voxel path benchmark and compares their costs with the published ones.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from uavexp.errors import require, require_non_negative, require_positive
+from uavexp.mapping.base import DistanceField
+from uavexp.planner.min_acc import MinAcc
+from uavexp.planner.search import FoundPath
+from uavexp.planner.voxel import live
+from uavexp.planner.voxel.canonical import BUDGET
+from uavexp.types import Float, Limits, PlanRequest, PlanResult, PlanStatus
+
+
+@dataclass(slots=True, kw_only=True)
+class Astar:
+    """Shortest voxel path at a clearance, smoothed and timed as `min_acc` does."""
+
+    min_clearance_m: float = 0.26
+    z_band_m: float = 0.3
+    unknown: str = "optimistic"
+    max_expansions: int = 300_000
+    movers: str = "current"
+    mover_margin_m: float = 0.5
+    mover_horizon_s: float = 2.0
+    _flight: MinAcc | None = field(default=None, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        require_positive(min_clearance_m=self.min_clearance_m)
+        require_non_negative(z_band_m=self.z_band_m)
+        require(
+            self.movers in ("current", "predicted"),
+            f"movers must be current or predicted, got {self.movers!r}",
+        )
+        self._shaped()  # checks what it is given
+
+    def _shaped(self) -> MinAcc:
+        return MinAcc(
+            min_clearance_m=self.min_clearance_m,
+            z_band_m=self.z_band_m,
+            unknown=self.unknown,
+            max_expansions=self.max_expansions,
+            mover_margin_m=self.mover_margin_m,
+            mover_horizon_s=self.mover_horizon_s,
+        )
+
+    def reset(self, limits: Limits, rng: np.random.Generator) -> None:
+        """Begin a trial of a vehicle with these limits; draws nothing."""
+        self._flight = self._shaped()
+        self._flight.reset(limits, rng)
+
+    def plan(self, request: PlanRequest) -> PlanResult:
+        """Return a trajectory or the reason why there is none (`Planner.plan`)."""
+        if self._flight is None:
+            raise RuntimeError("plan() needs reset() first")
+        if self.movers == "current":
+            tracks = request.tracks
+            standing = replace(tracks, velocity_mps=np.zeros_like(tracks.velocity_mps))
+            request = replace(request, tracks=standing)
+        return self._flight.plan_along(request, self)
+
+    def find(self, field_: DistanceField, start_m: Float, goal_m: Float, bounds_m: Float) -> FoundPath:
+        """Return the shortest path on the map (`search.Finder.find`)."""
+        refused = live.refusal(field_, start_m, goal_m, bounds_m, self.min_clearance_m)
+        if refused is not None:
+            return refused
+        grid = live.live_grid(
+            field_,
+            start_m,
+            goal_m,
+            bounds_m,
+            min_clearance_m=self.min_clearance_m,
+            z_band_m=self.z_band_m,
+            known_only=self.unknown == "conservative",
+        )
+        answer = live.surveyed(grid).shortest(grid.start, grid.goal, self.max_expansions)
+        if answer.status == BUDGET:
+            reason = f"not found in {self.max_expansions} expansions"
+            return live.failed(PlanStatus.NO_PATH, reason, answer.expansions)
+        if not answer.found:
+            reason = "start and goal are not joined at the clearance limit"
+            return live.failed(PlanStatus.NO_PATH, reason, answer.expansions)
+        path = live.in_metres(field_, grid, answer.cells + 0.5, start_m, goal_m)
+        return live.found(path, answer.cost * field_.voxel_size_m, answer.expansions)
+
+
+if __name__ == "__main__":
+    from uavexp.planner.voxel.benchmark import main
+
+    sys.exit(main(sys.argv[1:]))
