@@ -21,7 +21,7 @@ from uavexp.inspection.visibility import Camera
 from uavexp.types import World
 from uavexp.world.rooms import Rooms
 
-SIZES = {250: (30.0, 20.0), 500: (42.0, 28.0), 1000: (60.0, 40.0), 2000: (84.0, 56.0)}  # viewpoints: floor, m
+SIZES = {250: (22.0, 14.0), 500: (30.0, 20.0), 1000: (42.0, 28.0), 2000: (58.0, 40.0)}  # viewpoints: floor, m
 LARGEST_OUTLIERS = (1, 2, 3, 5, 8)
 
 
@@ -84,7 +84,7 @@ def main() -> None:
         print(f"wanted {wanted}: {len(plan.viewpoints)} viewpoints, {len(plan.segments)} segments, "
               f"coverage {plan.planned_coverage:.4f}")  # fmt: skip
         print("  " + ", ".join(f"{name} {value:.2f}" for name, value in seconds.items()), flush=True)
-        if wanted <= 500:
+        if wanted == 500:
             print("\n".join(merging(plan)), flush=True)
 
 

@@ -16,6 +16,7 @@ LAYERS = (
     {"errors"},
     {"types", "kernel_cache", "__init__"},
     {"seeding", "geometry", "flatness", "o3d", "triangle_grid", "bodies", "scene", "paths"},
+    {"cloud"},
     {"roles", "metrics", "inspection"},
     {"recorder", "pilot", "trial", "parameters", "trust", "records", "logs", "table", "worlds", "study"},
     {"sweep", "report"},

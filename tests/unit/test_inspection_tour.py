@@ -182,6 +182,20 @@ def test_lengths_over_the_lattice_are_scipys() -> None:
     )
 
 
+def test_far_points_are_reached_through_near_ones() -> None:
+    lattice = lattice_of(FIELD, BOUNDS, START, clearance_m=0.3)
+    rng = np.random.default_rng(106)
+    nodes = rng.choice(len(lattice.position_m), 250, replace=False)
+    points = lattice.position_m[nodes]
+    exact = travel_lengths(lattice, points, points)
+    found = travel_matrix(lattice, points)
+    least = np.minimum(exact, exact.T)
+    np.fill_diagonal(least, 0.0)
+    assert np.all(found >= least - 0.02)
+    assert np.quantile(found - least, 0.99) < 0.4
+    assert np.max(found / np.maximum(least, 0.5)) < 1.2
+
+
 def test_what_is_walled_off_cannot_be_reached() -> None:
     closed = HALL.copy()
     box(closed, (2.9, 0.0, 0.0), (3.1, 6.0, 2.0))

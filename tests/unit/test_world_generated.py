@@ -10,11 +10,13 @@ from uavexp.scene import Scene
 from uavexp.seeding import Stream, generator
 from uavexp.types import World
 from uavexp.world.corridors import Corridors
+from uavexp.world.facility import Facility
 from uavexp.world.random_columns import RandomColumns
 from uavexp.world.rooms import Rooms
+from uavexp.world.tunnel import Tunnel
 from uavexp.world.warehouse import Warehouse
 
-FAMILIES = (Warehouse, Corridors, Rooms, RandomColumns)
+FAMILIES = (Warehouse, Corridors, Rooms, RandomColumns, Facility, Tunnel)
 
 
 def draw(family: type, seed: int, **parameters: object) -> World:

@@ -23,7 +23,7 @@ from uavexp.inspection import tour_array, tour_kernels, tsplib
 from uavexp.types import Float, Int, Int32
 
 NEIGHBOURS = 8  # length of the neighbour lists
-KICKS_PER_NODE = 20
+KICKS_PER_NODE = 10
 LEAST_KICKS = 5000
 
 

@@ -20,7 +20,8 @@ from uavexp.mapping.base import DistanceField
 from uavexp.types import Bool, Float, Float32, Int, Int32
 
 _UNITS = 500  # of the longest edge: lengths are whole numbers, so buckets serve as queue
-_BUCKETS = 512  # > _UNITS
+_FINE_UNITS = 8000  # the same between points, where edges are long
+_NEAREST = 100  # points that the wave from a point must reach; those beyond go through them
 _STEPS = np.array(
     [(i, j, k) for i in (0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1) if (i, j, k) > (0, 0, 0)]
 )
@@ -160,28 +161,58 @@ def travel_lengths(lattice: Lattice, from_m: Float, to_m: Float) -> Float:
 
     Dijkstra (1959) with Dial's (1969) buckets, one run for each of the first points.
     """
-    number, leg = gates(lattice, from_m)
-    other, other_leg = gates(lattice, to_m)
-    over = _over_lattice(
-        lattice.starts, lattice.ends, lattice.units, lattice.unit_m, number, leg, other, other_leg
-    )
-    straight = _straight(
-        lattice.field.distance,
-        lattice.field.origin_m,
-        lattice.field.voxel_size_m,
-        lattice.clearance_m,
-        from_m,
-        to_m,
-    )
-    return np.asarray(np.minimum(over, straight))
+    over = _waves(lattice, from_m, to_m, len(to_m))
+    return np.asarray(np.minimum(over, _straight_in(lattice, from_m, to_m)))
 
 
 def travel_matrix(lattice: Lattice, points_m: Float) -> Float:
-    """Symmetric lengths (N, N) between points (N, 3), m, 0 on the diagonal."""
-    one_way = travel_lengths(lattice, points_m, points_m)
-    both = np.minimum(one_way, one_way.T)
+    """Symmetric lengths (N, N) between points (N, 3), m, 0 on the diagonal.
+
+    Waves over the lattice stop at the nearest hundred points; the way to farther ones leads
+    through these, at most a few centimetres a leg longer by rounding. Where that does not
+    join all, the waves run to the end.
+    """
+    near = _waves(lattice, points_m, points_m, _NEAREST)
+    near = np.minimum(near, near.T)
+    over = _through(near) if len(points_m) > _NEAREST else near
+    if not np.isfinite(over).all():
+        over = _waves(lattice, points_m, points_m, len(points_m))
+    both = np.minimum(np.minimum(over, over.T), _straight_in(lattice, points_m, points_m))
+    both = np.minimum(both, both.T)
     np.fill_diagonal(both, 0.0)
     return np.asarray(both)
+
+
+def _waves(lattice: Lattice, from_m: Float, to_m: Float, enough: int) -> Float:
+    number, leg = gates(lattice, from_m)
+    other, other_leg = gates(lattice, to_m)
+    return np.asarray(
+        _over_lattice(
+            lattice.starts, lattice.ends, lattice.units, lattice.unit_m, _UNITS, number, leg, other, other_leg,
+            enough,
+        )
+    )  # fmt: skip
+
+
+def _through(near: Float) -> Float:
+    """Shortest ways (N, N) over the finite lengths between points (N, N)."""
+    count = len(near)
+    here, there = np.nonzero(np.isfinite(near) & ~np.eye(count, dtype=np.bool_))
+    unit = max(float(near[here, there].max(initial=0.0)), 1e-3) / _FINE_UNITS
+    starts = np.searchsorted(here, np.arange(count + 1)).astype(np.int32)
+    units = np.ceil(near[here, there] / unit).astype(np.int32)
+    own, nothing = np.arange(count)[:, None], np.zeros((count, 1))
+    far = _over_lattice(
+        starts, there.astype(np.int32), units, unit, _FINE_UNITS, own, nothing, own, nothing, count
+    )
+    return np.asarray(np.minimum(near, far))
+
+
+def _straight_in(lattice: Lattice, from_m: Float, to_m: Float) -> Float:
+    field = lattice.field
+    return np.asarray(
+        _straight(field.distance, field.origin_m, field.voxel_size_m, lattice.clearance_m, from_m, to_m)
+    )
 
 
 @nb.njit(cache=True)
@@ -190,60 +221,73 @@ def _over_lattice(
     ends: Int32,
     units: Int32,
     unit_m: float,
+    longest: int,
     gate: Int,
     leg: Float,
     other: Int,
     other_leg: Float,
+    enough: int,
 ) -> Float:
-    """Least length (F, T) from any gate of one point to any gate of another, legs included."""
+    """Least length (F, T) from any gate of one point to any gate of another, legs included.
+
+    A wave ends when it has reached so many (`enough`) of the other points; lengths beyond
+    are those of ways found so far, or inf. `longest` bounds the units of an edge.
+    """
+    buckets = longest + 2
     length = np.full((gate.shape[0], other.shape[0]), np.inf)
     nodes = starts.shape[0] - 1
     far = np.int32(2**31 - 1)
     reached = np.empty(nodes, dtype=np.int32)
+    asked = np.zeros(nodes, dtype=np.int32)  # points whose nearest gate this is
+    for target in range(other.shape[0]):
+        best = np.argmin(other_leg[target])
+        if other[target, best] >= 0:
+            asked[other[target, best]] += 1
     node_of = np.empty(ends.shape[0] + gate.shape[1], dtype=np.int32)  # entries of the bucket lists
     following = np.empty_like(node_of)
-    head = np.empty(_BUCKETS, dtype=np.int32)
+    head = np.empty(buckets, dtype=np.int32)
     for source in range(gate.shape[0]):
         reached[:] = far
         head[:] = -1
-        entries, waiting, now = 0, 0, 0
+        entries, waiting, now, found = 0, 0, 0, 0
         for item in range(gate.shape[1]):
             node = gate[source, item]
             if node < 0:
                 continue
-            begin = np.int32(min(leg[source, item] / unit_m + 0.5, 2.0 * _UNITS))
+            begin = np.int32(leg[source, item] / unit_m + 0.5)
             if begin < reached[node]:
                 reached[node] = begin
         for item in range(gate.shape[1]):  # legs of any length: entered when their time comes
             node = gate[source, item]
             if node >= 0:
-                node_of[entries], following[entries] = node, head[reached[node] % _BUCKETS]
-                head[reached[node] % _BUCKETS] = entries
+                node_of[entries], following[entries] = node, head[reached[node] % buckets]
+                head[reached[node] % buckets] = entries
                 entries, waiting = entries + 1, waiting + 1
-        while waiting > 0:
-            entry = head[now % _BUCKETS]
+        while waiting > 0 and found < enough:
+            entry = head[now % buckets]
             if entry < 0:
                 now += 1
                 continue
             later = -1
             while entry >= 0:
-                head[now % _BUCKETS] = following[entry]
+                head[now % buckets] = following[entry]
                 node = node_of[entry]
                 if reached[node] > now:  # a long leg, of a later round
                     following[entry], later = later, entry
                 elif reached[node] == now:
                     waiting -= 1
+                    found += asked[node]
                     for edge in range(starts[node], starts[node + 1]):
                         near, there = ends[edge], now + units[edge]
                         if there < reached[near]:
                             reached[near] = there
-                            node_of[entries], following[entries] = near, head[there % _BUCKETS]
-                            head[there % _BUCKETS] = entries
+                            node_of[entries], following[entries] = near, head[there % buckets]
+                            head[there % buckets] = entries
                             entries, waiting = entries + 1, waiting + 1
                 else:
                     waiting -= 1  # outdated
-                entry = head[now % _BUCKETS]
-            head[now % _BUCKETS] = later
+                entry = head[now % buckets]
+            head[now % buckets] = later
             now += 1
         for target in range(other.shape[0]):
             for item in range(other.shape[1]):

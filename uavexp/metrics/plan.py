@@ -47,7 +47,7 @@ def measures(log: TrialLog, world: World) -> dict[str, float]:
         float(clearance_m.min()),
         float(stretches(clearance_m < log.body_radius_m)),
         float(log.plan_collision_checks),
-        float(log.replans[0].iterations) if log.replans else float("nan"),
+        float(log.replans[0].expansions) if log.replans else float("nan"),
     )
     return dict(zip(_NAMES, values, strict=True))
 
@@ -62,7 +62,7 @@ _NAMES = (
     "plan_min_clearance_m",  # true, of the body's centre to fixed surfaces
     "plan_collisions",  # stretches on which that is less than the body's radius
     "plan_collision_checks",
-    "plan_iterations",
+    "plan_iterations",  # of the search: nodes expanded, edges taken, samples
 )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
 
-from uavexp.metrics import coverage
+from uavexp.metrics import clearance, coverage, path
 from uavexp.report import plan_view, style
 from uavexp.types import Bool, Float, TrialLog, World
 
@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.colors import Normalize
 
 HIDDEN = "#8A6FB0"  # cells that no place within reach sees
-PERSON = "#CC79A7"
-BLOCK = "#E69F00"
+CELL_M = 0.12  # side of a cell as drawn; neighbours stay apart
 ARROW_M = 0.35  # length of a viewpoint's arrow
 _BASE = (0, 2, 6, 4)  # corners of a box's underside, in the order around it (`world.boxes`)
 
@@ -34,10 +33,10 @@ def draw(axes: Axes, world: World, log: TrialLog, view: Float) -> Normalize:
     plan_view.draw_truth(axes, world, plan_view.visited_m(world, log))
     for corners in blocks_m(world):
         axes.add_patch(
-            Polygon(list(corners[_BASE, :2]), fc=BLOCK, ec=style.BLACK, lw=0.5, alpha=0.8, zorder=1)
+            Polygon(list(corners[_BASE, :2]), fc=style.ORANGE, ec=style.BLACK, lw=0.5, alpha=0.8, zorder=1)
         )
     _draw_people(axes, log)
-    _draw_cells(axes, log)
+    _draw_cells(axes, log, view)
     _draw_viewpoints(axes, log)
     scale = plan_view.draw_path(axes, log)
     for contact in log.contacts:
@@ -76,9 +75,11 @@ def handles(world: World, log: TrialLog) -> list[Line2D | Patch]:
         Line2D([], [], color="white", marker="o", ls="", mec=style.BLACK, mew=1.3, ms=7, label="start"),
     ]
     if len(blocks_m(world)):
-        shown.append(Patch(fc=BLOCK, ec=style.BLACK, label=f"unforeseen block ({len(blocks_m(world))})"))
+        shown.append(
+            Patch(fc=style.ORANGE, ec=style.BLACK, label=f"unforeseen block ({len(blocks_m(world))})")
+        )
     if log.mover_shape.size:
-        shown.append(Line2D([], [], color=PERSON, lw=1.0, label=f"moving ({log.mover_shape.size})"))
+        shown.append(Line2D([], [], color=style.PURPLE, lw=1.0, label=f"moving ({log.mover_shape.size})"))
     if log.contacts:
         label = f"contact ({len(log.contacts)})"
         shown.append(Line2D([], [], color=style.VERMILLION, marker="X", ls="", ms=9, label=label))
@@ -86,13 +87,19 @@ def handles(world: World, log: TrialLog) -> list[Line2D | Patch]:
 
 
 def key_numbers(log: TrialLog) -> str:
-    """Coverage and viewpoints, for the header."""
+    """Coverage, viewpoints and the flight, for the header."""
     visible, all_ = coverage.coverage_visible(log), coverage.coverage(log)
     share = f"{100.0 * visible:.2f} %" if math.isfinite(visible) else "–"
     visited = int(np.isfinite(log.viewpoint_visited_s).sum())
-    return (
-        f"seen {share} of what can be seen ({100.0 * all_:.1f} % of all)    "
-        f"viewpoints {visited} of {len(log.viewpoint_visited_s)}"
+    return "    ".join(
+        (
+            f"seen {share} of what can be seen ({100.0 * all_:.1f} % of all)",
+            f"viewpoints {visited} of {len(log.viewpoint_visited_s)}",
+            f"path {path.path_length_m(log):.1f} m",
+            f"time {path.completion_time_s(log):.1f} s",
+            f"contacts {len(log.contacts)}",
+            f"least clearance {clearance.smallest_m(log.clearance_m):.2f} m",
+        )
     )
 
 
@@ -116,16 +123,18 @@ def _draw_people(axes: Axes, log: TrialLog) -> None:
     stride = max(1, len(log.mover_position_m) // 1000)
     for mover in range(log.mover_shape.size):
         places = log.mover_position_m[::stride, mover]
-        axes.plot(places[:, 0], places[:, 1], color=PERSON, lw=0.6, alpha=0.5, zorder=1.5)
-        axes.plot(*places[-1, :2], "o", color=PERSON, mec=style.BLACK, mew=0.4, ms=6, zorder=5.5)
+        axes.plot(places[:, 0], places[:, 1], color=style.PURPLE, lw=0.6, alpha=0.5, zorder=1.5)
+        axes.plot(*places[-1, :2], "o", color=style.PURPLE, mec=style.BLACK, mew=0.4, ms=6, zorder=5.5)
 
 
-def _draw_cells(axes: Axes, log: TrialLog) -> None:
-    """Draw every cell from above, what was not seen on top."""
+def _draw_cells(axes: Axes, log: TrialLog, view: Float) -> None:
+    """Draw every cell from above, what was not seen on top and larger."""
+    width_pt = axes.get_window_extent().width / axes.figure.dpi * 72.0
+    cell_pt = max(CELL_M / float(view[1, 0] - view[0, 0]) * width_pt, 1.2)
     colours = (style.GREEN, HIDDEN, style.VERMILLION)
     for order, (chosen, colour) in enumerate(zip(kinds(log), colours, strict=True)):
         places = np.unique(np.round(log.cell_m[chosen, :2].astype(np.float64), 2), axis=0)
-        size_pt = (1.6, 1.9, 2.6)[order]
+        size_pt = cell_pt + 0.7 * order
         axes.plot(places[:, 0], places[:, 1], "s", color=colour, ms=size_pt, mew=0, zorder=2 + 0.1 * order)
 
 

@@ -198,9 +198,9 @@ def _draw_header(sheet: page.Page, world: World, log: TrialLog, metrics: Values,
     )
     head = f"{' · '.join(names)}: {ending}"
     sheet.figure.text(left, 1.0 - 0.23 / height_in, head, fontsize=12, fontweight="bold", va="center")
-    numbers = [inspection_view.key_numbers(log)] if inspection_view.is_inspection(log) else []
-    numbers.append(_key_numbers(metrics))
-    sheet.figure.text(left, 1.0 - 0.43 / height_in, "    ".join(numbers), fontsize=9, va="center")
+    inspects = inspection_view.is_inspection(log)
+    numbers = inspection_view.key_numbers(log) if inspects else _key_numbers(metrics)
+    sheet.figure.text(left, 1.0 - 0.43 / height_in, numbers, fontsize=9, va="center")
     command = textwrap.shorten(title, 170, placeholder=" …")
     size = min(8.0, 8.0 * 150 / max(len(command), 1))
     sheet.figure.text(

@@ -8,6 +8,7 @@ from uavexp.errors import require_option
 from uavexp.planner.smoothing.base import Smoother
 from uavexp.planner.smoothing.bspline_qp import BsplineSmoother, Derivative
 from uavexp.planner.smoothing.time_law import TimeLaw
+from uavexp.planner.smoothing.waypoint_spline import WaypointSpline
 
 
 class Smoothing(StrEnum):
@@ -15,19 +16,21 @@ class Smoothing(StrEnum):
 
     BSPLINE_QP = "bspline_qp"
     NONE = "none"  # a time law along the path, no more
+    WAYPOINT_SPLINE = "waypoint_spline"  # through the corners, whatever the limits: for comparison
 
 
 def make_smoother(name: str, derivative: str = "acceleration") -> Smoother:
     """Build a smoother.
 
     Args:
-        name: `bspline_qp` or `none`.
+        name: `bspline_qp`, `none` or `waypoint_spline`.
         derivative: what `bspline_qp` minimises: acceleration, jerk or snap.
 
     Raises:
         ConfigError: when a name is unknown.
     """
     kind = require_option("derivative", derivative, Derivative)
-    if require_option("smoothing", name, Smoothing) is Smoothing.BSPLINE_QP:
+    smoothing = require_option("smoothing", name, Smoothing)
+    if smoothing is Smoothing.BSPLINE_QP:
         return BsplineSmoother(derivative=kind)
-    return TimeLaw()
+    return TimeLaw() if smoothing is Smoothing.NONE else WaypointSpline()
