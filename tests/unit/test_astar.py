@@ -62,11 +62,8 @@ def test_in_open_space_a_move_goes_on_to_its_parts_only() -> None:
     for arrived in range(27):
         if arrived == STAY:
             continue
-        parts = {
-            n
-            for n in range(27)
-            if n != STAY and (np.abs(STEPS[n]) <= np.abs(STEPS[arrived])).all() and (STEPS[n] * STEPS[arrived] >= 0).all()
-        }  # fmt: skip
+        inside = (np.abs(STEPS) <= np.abs(STEPS[arrived])) & (STEPS * STEPS[arrived] >= 0)
+        parts = {int(n) for n in np.flatnonzero(inside.all(axis=1)) if n != STAY}
         assert {n for n in range(27) if canonical_moves(arrived, FULL) >> n & 1} == parts
 
 

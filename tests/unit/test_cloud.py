@@ -50,7 +50,7 @@ def test_counts_of_a_room() -> None:
     assert counts.horizontal_share == pytest.approx(area[0] / area.sum(), abs=0.15)
     assert counts.vertical_share + counts.horizontal_share == pytest.approx(counts.planar_share)
     assert counts.deviation is not None
-    assert max(map(abs, counts.deviation)) < 0.08  # a voxel of 0.1 m on either side of 2.5 m
+    assert max(map(abs, counts.deviation)) < 0.02
 
 
 def test_the_same_seed_gives_the_same_model() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -29,7 +30,7 @@ def drawn(request: pytest.FixtureRequest) -> World:
 def test_start_and_target_are_joined_with_the_clearance(drawn: World) -> None:
     path = drawn.shortest_path
     np.testing.assert_array_equal(path[[0, -1]], [drawn.start_m, drawn.target_m])
-    points = np.concatenate([np.linspace(a, b, 200) for a, b in zip(path, path[1:], strict=False)])
+    points = np.concatenate([np.linspace(a, b, 200) for a, b in pairwise(path)])
     assert Scene(drawn).distance_m(points).min() >= 0.4 - 1e-5
     assert ((points >= drawn.flight_bounds_m[0]) & (points <= drawn.flight_bounds_m[1])).all()
 
@@ -89,7 +90,7 @@ def test_impossible_parameters_are_refused(parameters: dict[str, object]) -> Non
 
 def test_what_cannot_be_joined_is_an_error_that_names_the_parameter() -> None:
     with pytest.raises(WorldError, match="hatch_m"):
-        draw(0, hatch_m=0.85)
+        draw(0, hatch_m=0.801, hatches=1, storeys=2, racks=1, size_m=[6.0, 4.0, 4.4])
 
 
 def box_world(base: World) -> World:

@@ -37,7 +37,7 @@ class CloudCounts:
     voxels: int  # non-empty
     obstacle_voxels: int  # not traversable
     specks: int  # voxels of groups that are too small
-    dimensions_m: tuple[float, float, float]  # of the obstacles, outer faces of their voxels
+    dimensions_m: tuple[float, float, float]  # of the obstacles, between the outermost centroids
     deviation: tuple[float, float, float] | None  # from the true dimensions, relative; None without truth
 
 
@@ -105,8 +105,7 @@ class CloudPipeline:
         obstacle = obstacles(voxels, self.least_voxels)
         if not obstacle.any():
             raise CloudError(f"no {self.least_voxels} voxels of the cloud hang together")
-        index = voxels.index[obstacle]
-        sides = (index.max(axis=0) + 1 - index.min(axis=0)) * self.voxel_size_m
+        sides = np.ptp(voxels.centroid_m[obstacle], axis=0)
         upright = np.array([*(plane.is_vertical for plane in planes), False])
         level = np.array([*(plane.is_horizontal for plane in planes), False])
         x, y, z = (float(side) for side in sides)

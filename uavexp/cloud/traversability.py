@@ -30,6 +30,6 @@ def obstacles(voxels: Voxels, least_voxels: int) -> Bool:
         rows.append(met)
         columns.append(place[met])
     row, column = np.concatenate(rows), np.concatenate(columns)
-    graph = coo_matrix((np.ones(len(row), dtype=np.bool_), (row, column)), shape=(count, count))
+    graph = coo_matrix((np.ones(len(row), dtype=np.int8), (row, column)), shape=(count, count))
     label = connected_components(graph, directed=False)[1]
     return np.asarray(np.bincount(label)[label] >= least_voxels)

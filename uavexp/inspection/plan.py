@@ -9,10 +9,11 @@ import numpy as np
 
 from uavexp.errors import require
 from uavexp.inspection import clusters as runs
+from uavexp.inspection.lattice import Lattice, lattice_of
 from uavexp.inspection.reference import Surface
 from uavexp.inspection.segmentation import Growing, Segment, segments_of
 from uavexp.inspection.tour import open_tour
-from uavexp.inspection.travel import Lattice, is_reachable, lattice_of, travel_lengths, travel_matrix
+from uavexp.inspection.travel import is_reachable, travel_lengths, travel_matrix
 from uavexp.inspection.viewpoints import Pattern, Viewpoints, added, needed, pattern_of
 from uavexp.inspection.visibility import Camera, Grid, Views, seen_by, views_of, witnesses
 from uavexp.mapping.base import DistanceField

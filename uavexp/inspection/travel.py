@@ -1,137 +1,39 @@
-"""Travel lengths that respect walls: shortest paths on a lattice of a distance field.
+"""Travel lengths that respect walls: shortest paths over the lattice.
 
-The lattice has nodes where the vehicle fits, joined to their 26 neighbours where it also
-fits halfway; only the part joined to the start is kept. Between two points the length is
-that of the straight line where the vehicle fits along it, else that of the shortest path
-over the lattice, an upper bound of the true one.
+Between two points the length is that of the straight line where the vehicle fits along it,
+else that of the shortest path over the lattice, an upper bound of the true one.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numba as nb
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
-from uavexp.errors import require_positive
-from uavexp.mapping.base import DistanceField
+from uavexp.inspection.lattice import EDGE_UNITS, Lattice
+from uavexp.inspection.lattice import lattice_of as lattice_of  # importers of both take it from here
 from uavexp.types import Bool, Float, Float32, Int, Int32
 
-_UNITS = 500  # of the longest edge: lengths are whole numbers, so buckets serve as queue
 _FINE_UNITS = 8000  # the same between points, where edges are long
 _NEAREST = 100  # points that the wave from a point must reach; those beyond go through them
-_STEPS = np.array(
-    [(i, j, k) for i in (0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1) if (i, j, k) > (0, 0, 0)]
-)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Lattice:
-    """Nodes that can be reached from the start, and the edges between them in compressed rows."""
-
-    field: DistanceField
-    clearance_m: float
-    origin_m: Float  # (3,) of node (0, 0, 0)
-    step_m: Float  # (3,)
-    node: Int32  # (X, Y, Z) number of a node, -1: not reachable
-    position_m: Float  # (M, 3)
-    starts: Int32  # (M + 1,)
-    ends: Int32  # (E,) both ways
-    units: Int32  # (E,) length
-    unit_m: float
-
-
-def lattice_of(
-    field: DistanceField,
-    flight_bounds_m: Float,
-    start_m: Float,
-    clearance_m: float = 0.45,
-    cell_m: float = 0.2,
-    layer_m: float = 0.4,
-) -> Lattice:
-    """Lattice of the free space joined to a start.
-
-    Args:
-        field: distances to obstacles.
-        flight_bounds_m: (2, 3) box that holds all nodes.
-        start_m: (3,); its part of the lattice is that of the nearest node within three cells.
-        clearance_m: that every node has.
-        cell_m: horizontal spacing.
-        layer_m: vertical spacing.
-
-    Returns:
-        the lattice; without nodes when the start is near none.
-    """
-    require_positive(clearance_m=clearance_m, cell_m=cell_m, layer_m=layer_m)
-    step = np.array([cell_m, cell_m, layer_m])
-    room = np.asarray(flight_bounds_m[1] - flight_bounds_m[0], dtype=np.float64)
-    shape = np.maximum(np.floor(room / step + 1e-9).astype(int) + 1, 1)
-    origin = np.asarray(flight_bounds_m[0]) + 0.5 * (room - (shape - 1) * step)
-    points = origin + np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1) * step
-    passable = (field.distance_m(points.reshape(-1, 3)) >= clearance_m).reshape(shape)
-    position = points[passable]
-    number = np.full(shape, -1, dtype=np.int32)
-    number[passable] = np.arange(position.shape[0])
-    pairs = _edges(field, number, position, clearance_m)
-    part = _part_of(position, pairs, start_m, 3.0 * max(cell_m, layer_m))
-    renumbered = np.cumsum(part, dtype=np.int32) - 1
-    pairs = renumbered[pairs[part[pairs[:, 0]]]].astype(np.int64)
-    position = position[part]
-    number[passable] = np.where(part, renumbered, -1)
-    unit = float(np.linalg.norm(step)) / _UNITS
-    both = np.concatenate([pairs, pairs[:, ::-1]])
-    both = both[np.lexsort((both[:, 1], both[:, 0]))]
-    length = np.linalg.norm(position[both[:, 0]] - position[both[:, 1]], axis=1)
-    return Lattice(
-        field=field,
-        clearance_m=clearance_m,
-        origin_m=origin,
-        step_m=step,
-        node=number,
-        position_m=position,
-        starts=np.searchsorted(both[:, 0], np.arange(position.shape[0] + 1)).astype(np.int32),
-        ends=np.ascontiguousarray(both[:, 1], dtype=np.int32),
-        units=np.round(length / unit).astype(np.int32),
-        unit_m=unit,
-    )
-
-
-def _edges(field: DistanceField, number: Int32, position: Float, clearance_m: float) -> Int:
-    """Pairs of neighbouring nodes (E, 2) between which the vehicle fits, each once."""
-    found = [np.zeros((0, 2), dtype=np.int64)]
-    for step in _STEPS:
-        here, there = [], []
-        for axis, shift in enumerate(step):
-            count = number.shape[axis]
-            here.append(slice(max(-shift, 0), count - max(shift, 0)))
-            there.append(slice(max(shift, 0), count - max(-shift, 0)))
-        pair = np.stack([number[tuple(here)].ravel(), number[tuple(there)].ravel()], axis=1).astype(np.int64)
-        pair = pair[(pair >= 0).all(axis=1)]
-        halfway = 0.5 * (position[pair[:, 0]] + position[pair[:, 1]])
-        found.append(pair[field.distance_m(halfway) >= clearance_m])
-    return np.concatenate(found)
-
-
-def _part_of(position: Float, pairs: Int, start_m: Float, reach_m: float) -> Bool:
-    """Nodes (M,) joined to the one nearest to the start."""
-    count = position.shape[0]
-    apart = np.linalg.norm(position - start_m, axis=1)
-    if count == 0 or not apart.min() <= reach_m:
-        return np.zeros(count, dtype=np.bool_)
-    graph = coo_matrix((np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-    _, label = connected_components(graph, directed=False)
-    joined: Bool = label == label[apart.argmin()]
-    return joined
 
 
 def gates(lattice: Lattice, points_m: Float) -> tuple[Int, Float]:
     """Nodes through which points (N, 3) enter the lattice: numbers (N, 8), -1 for none, and legs m.
 
-    They are the corners of the lattice's cell around a point to which the vehicle fits
-    halfway; a point with less clearance than the nodes may enter too, the start may be such.
+    A point among no free nodes, as the start may be, enters through the nearest one within
+    the three cells in which `lattice_of` looks for it.
     """
+    number, leg = _corner_gates(lattice, points_m)
+    if lattice.position_m.shape[0] > 0:
+        for point in np.flatnonzero((number < 0).all(axis=1)):
+            apart = np.linalg.norm(lattice.position_m - points_m[point], axis=1)
+            if apart.min() <= 3.0 * lattice.step_m.max():
+                number[point, 0], leg[point, 0] = apart.argmin(), apart.min()
+    return number, leg
+
+
+def _corner_gates(lattice: Lattice, points_m: Float) -> tuple[Int, Float]:
+    """The corners of the lattice's cell around each point to which the vehicle fits halfway."""
     low = np.floor((points_m - lattice.origin_m) / lattice.step_m).astype(np.int64)
     shape = np.array(lattice.node.shape)
     corner = np.array([(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)])
@@ -151,7 +53,7 @@ def gates(lattice: Lattice, points_m: Float) -> tuple[Int, Float]:
 
 def is_reachable(lattice: Lattice, points_m: Float) -> Bool:
     """Whether the vehicle can come from the start to each point (N, 3) with its clearance (N,)."""
-    number, _ = gates(lattice, points_m)
+    number, _ = _corner_gates(lattice, points_m)
     reachable: Bool = (number >= 0).any(axis=1) & (lattice.field.distance_m(points_m) >= lattice.clearance_m)
     return reachable
 
@@ -161,7 +63,7 @@ def travel_lengths(lattice: Lattice, from_m: Float, to_m: Float) -> Float:
 
     Dijkstra (1959) with Dial's (1969) buckets, one run for each of the first points.
     """
-    over = _waves(lattice, from_m, to_m, len(to_m))
+    over = _waves(lattice, from_m, to_m, len(to_m) + 1)
     return np.asarray(np.minimum(over, _straight_in(lattice, from_m, to_m)))
 
 
@@ -176,7 +78,7 @@ def travel_matrix(lattice: Lattice, points_m: Float) -> Float:
     near = np.minimum(near, near.T)
     over = _through(near) if len(points_m) > _NEAREST else near
     if not np.isfinite(over).all():
-        over = _waves(lattice, points_m, points_m, len(points_m))
+        over = _waves(lattice, points_m, points_m, len(points_m) + 1)
     both = np.minimum(np.minimum(over, over.T), _straight_in(lattice, points_m, points_m))
     both = np.minimum(both, both.T)
     np.fill_diagonal(both, 0.0)
@@ -186,12 +88,8 @@ def travel_matrix(lattice: Lattice, points_m: Float) -> Float:
 def _waves(lattice: Lattice, from_m: Float, to_m: Float, enough: int) -> Float:
     number, leg = gates(lattice, from_m)
     other, other_leg = gates(lattice, to_m)
-    return np.asarray(
-        _over_lattice(
-            lattice.starts, lattice.ends, lattice.units, lattice.unit_m, _UNITS, number, leg, other, other_leg,
-            enough,
-        )
-    )  # fmt: skip
+    edges = lattice.starts, lattice.ends, lattice.units, lattice.unit_m, EDGE_UNITS
+    return np.asarray(_over_lattice(*edges, number, leg, other, other_leg, enough))
 
 
 def _through(near: Float) -> Float:
@@ -203,7 +101,7 @@ def _through(near: Float) -> Float:
     units = np.ceil(near[here, there] / unit).astype(np.int32)
     own, nothing = np.arange(count)[:, None], np.zeros((count, 1))
     far = _over_lattice(
-        starts, there.astype(np.int32), units, unit, _FINE_UNITS, own, nothing, own, nothing, count
+        starts, there.astype(np.int32), units, unit, _FINE_UNITS, own, nothing, own, nothing, count + 1
     )
     return np.asarray(np.minimum(near, far))
 
@@ -230,8 +128,8 @@ def _over_lattice(
 ) -> Float:
     """Least length (F, T) from any gate of one point to any gate of another, legs included.
 
-    A wave ends when it has reached so many (`enough`) of the other points; lengths beyond
-    are those of ways found so far, or inf. `longest` bounds the units of an edge.
+    A wave ends when it has reached `enough` of the other points, never if there are fewer;
+    lengths beyond are those of ways found so far, or inf. `longest` bounds the units of an edge.
     """
     buckets = longest + 2
     length = np.full((gate.shape[0], other.shape[0]), np.inf)

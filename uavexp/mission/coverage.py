@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from uavexp.inspection.lattice import lattice_of
 from uavexp.inspection.plan import sparse_places
 from uavexp.inspection.reference import Surface, reference_field
-from uavexp.inspection.travel import lattice_of
 from uavexp.inspection.visibility import Camera, Grid, visible_cells, witnesses
 from uavexp.scene import Scene
 from uavexp.types import Bool, Float, Int, World

@@ -16,8 +16,9 @@ from enum import StrEnum
 import numpy as np
 
 from uavexp.geometry import wrap_angle, yaw_of
+from uavexp.inspection.lattice import lattice_of
 from uavexp.inspection.plan import InspectionPlan, Settings, adapt_order, path_from, sparse_places
-from uavexp.inspection.travel import is_reachable, lattice_of, travel_lengths, travel_matrix
+from uavexp.inspection.travel import is_reachable, travel_lengths, travel_matrix
 from uavexp.inspection.view_angle import Weights, cell_weights, choose_yaw
 from uavexp.inspection.viewpoints import Viewpoints, added
 from uavexp.inspection.visibility import Camera, Grid, Views, visible_cells, witnesses

@@ -94,7 +94,7 @@ class Astar:
         if not answer.found:
             reason = "start and goal are not joined at the clearance limit"
             return live.failed(PlanStatus.NO_PATH, reason, answer.expansions)
-        path = live.in_metres(field_, grid, answer.cells + 0.5, start_m, goal_m)
+        path = live.in_metres(field_, grid, answer.centres, start_m, goal_m)
         return live.found(path, answer.cost * field_.voxel_size_m, answer.expansions)
 
 

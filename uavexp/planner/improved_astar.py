@@ -21,9 +21,10 @@ from uavexp.mapping.base import DistanceField
 from uavexp.planner.min_acc import MinAcc
 from uavexp.planner.search import FoundPath
 from uavexp.planner.voxel import directed, live
+from uavexp.planner.voxel.canonical import BUDGET
 from uavexp.planner.voxel.grid import Turning, VoxelGrid, VoxelPath
 from uavexp.planner.voxel.smoothing import smoothed
-from uavexp.types import Float, Limits, PlanRequest, PlanResult, PlanStatus
+from uavexp.types import Float, Int, Limits, PlanRequest, PlanResult, PlanStatus
 
 _SLOW_MPS = 0.1  # a slower start has no direction
 
@@ -133,14 +134,14 @@ class ImprovedAstar:
             else directed.COUNT_MADE,
         )
 
-    def search(self, grid: VoxelGrid, start: Float, goal: Float, wish: Turning) -> tuple[VoxelPath, str]:
+    def search(self, grid: VoxelGrid, start: Int, goal: Int, wish: Turning) -> tuple[VoxelPath, str]:
         """Path between two cells (3,), and what is to be said when plain A* had to answer."""
         answer = grid.turning(start, goal, wish, self.max_expansions)
         if answer.found:
             return answer, ""
         plain = grid.shortest(start, goal, self.max_expansions)
         plain = plain._replace(expansions=plain.expansions + answer.expansions)
-        if answer.status == directed.BUDGET:
+        if answer.status == BUDGET:
             return plain, f"plain A*: not found in {self.max_expansions} expansions"
         return plain, "plain A*: the vertical rule leaves no path"
 
@@ -163,6 +164,6 @@ class ImprovedAstar:
         if not answer.found:
             reason = "start and goal are not joined at the clearance limit, or the budget is spent"
             return live.failed(PlanStatus.NO_PATH, reason, answer.expansions)
-        path = live.in_metres(field_, grid, smoothed(grid.free, answer.cells + 0.5), start_m, goal_m)
+        path = live.in_metres(field_, grid, smoothed(grid.free, answer.centres), start_m, goal_m)
         found = live.found(path, answer.cost * field_.voxel_size_m, answer.expansions)
         return replace(found, reason=remark)

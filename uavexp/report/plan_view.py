@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 BAND_M = 0.5  # the plan shows what stands within this of the flight height
 MARGIN_M = 3.0  # around everything flown
 LEAST_CELL_M, MOST_CELLS = 0.025, 2000  # of the section
-MOST_SEGMENTS = 1000  # of the flown path
+MOST_SEGMENTS = 4000  # of the flown path
 SPEED_COLOURS = LinearSegmentedColormap.from_list("speed", ["#8CC4EA", "#2F86C1", "#0A2F5C"])
 
 

@@ -19,6 +19,8 @@ POST_M = 0.09  # uprights, square
 SHELF_M = 0.04  # thickness of a shelf board
 BAY_M = 1.8  # rack length between uprights
 RAIL_M = (0.04, 1.0)  # of the rail on both long sides of a hatch: thickness, height
+PASSAGE_M = 1.4  # gap in every row
+RACK_HEADROOM_M = 0.35  # from a row to the ceiling of its storey
 DUCT_M = 0.3  # side of the duct under each ceiling
 TASK_ATTEMPTS = 40  # drawings of start and target in one geometry
 
@@ -155,10 +157,10 @@ class Multilevel:
         aisle = self._aisle_m()
         for n in range(self.racks):
             front = aisle + n * (self.rack_depth_m + aisle)
-            ends = rng.uniform(1.0, 1.7, 2)
-            gap = float(rng.uniform(ends[0] + 1.0, length - ends[1] - 2.4))
-            for begin, end in ((ends[0], gap), (gap + 1.4, length - ends[1])):
-                self._rack(boxes, rng, (begin, end), front, (floor, ceiling - 0.35))
+            begin, end = rng.uniform(1.0, 1.7), length - rng.uniform(1.0, 1.7)
+            passage = begin + (end - begin - PASSAGE_M) * rng.uniform(0.1, 0.9)
+            for stretch in ((begin, passage), (passage + PASSAGE_M, end)):
+                self._rack(boxes, rng, stretch, front, (floor, ceiling - RACK_HEADROOM_M))
         x = float(rng.uniform(1.0, length - 1.0 - DUCT_M))
         boxes.span((x, 0.0, ceiling - DUCT_M), (x + DUCT_M, width, ceiling))
 

@@ -16,8 +16,8 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
-from uavexp.planner.voxel.jump import Terrain, moves_from, run_length
-from uavexp.planner.voxel.moves import LENGTHS, STEPS, octile
+from uavexp.planner.voxel.jump import Terrain, is_near, neighbourhood, remembered_moves, run_length
+from uavexp.planner.voxel.moves import FULL, LENGTHS, STEPS, octile
 from uavexp.types import Int, Int32
 
 FOUND, NO_PATH, BUDGET = 0, 1, 2
@@ -46,7 +46,8 @@ def find(
         max_expansions: budget.
         slot: scratch (cells,), any contents.
     """
-    state, shape, near_x, near_y, near_z, keys, known = terrain
+    shape, free, near_x, near_y, near_z, keys, known = terrain
+    full = FULL
     row, slab = shape[2], shape[1] * shape[2]
     goal_i, goal_j, goal_k = goal[0], goal[1], goal[2]
     source = start[0] * slab + start[1] * row + start[2]
@@ -83,7 +84,10 @@ def find(
         if expansions >= max_expansions:
             return BUDGET, np.inf, expansions, np.empty((0, 3), dtype=np.int32)
         expansions += 1
-        moves = moves_from(state, shape, keys, known, cell, arrived[node])
+        bits = full
+        if is_near(near_z, shape, ci, cj, ck):
+            bits = neighbourhood(free, shape, ci, cj, ck)
+        moves = remembered_moves(keys, known, arrived[node], bits)
         n = -1
         while moves != 0:
             n += 1
@@ -95,17 +99,26 @@ def find(
             step = si * slab + sj * row + sk
             count = 1
             if si * si + sj * sj + sk * sk == 1:
-                if state[cell + step] == 3:
+                if not is_near(near_z, shape, ci + si, cj + sj, ck + sk):
                     count += run_length(near_x, near_y, near_z, shape, n, ci + si, cj + sj, ck + sk)
                 away = (goal_i - ci) * si + (goal_j - cj) * sj + (goal_k - ck) * sk
                 if 0 < away <= count and cell + away * step == target:
                     count = away
             other = cell + count * step
-            if other != target and state[other] != 3 and moves_from(state, shape, keys, known, other, n) == 0:
-                continue
             there = cost[node] + count * LENGTHS[n]
             new = slot[other]
-            if not (0 <= new < nodes and cell_of[new] == other):
+            fresh = not (0 <= new < nodes and cell_of[new] == other)
+            if not fresh and there >= cost[new] - _SAME:
+                continue
+            oi, oj, ok = ci + count * si, cj + count * sj, ck + count * sk
+            ahead = octile(oi - goal_i, oj - goal_j, ok - goal_k)
+            if there + ahead >= best - _SAME:
+                continue
+            if other != target and is_near(near_z, shape, oi, oj, ok):
+                bits = neighbourhood(free, shape, oi, oj, ok)
+                if remembered_moves(keys, known, n, bits) == 0:
+                    continue
+            if fresh:
                 if nodes == cost.shape[0]:
                     cell_of, parent = _grown(cell_of, 0), _grown(parent, 0)
                     cost, arrived = _grown(cost, 0), _grown(arrived, 0)
@@ -113,14 +126,9 @@ def find(
                 new = nodes
                 nodes += 1
                 slot[other], cell_of[new] = new, other
-            elif there >= cost[new] - _SAME:
-                continue
             cost[new], parent[new], arrived[new], closed[new] = there, node, n, False
             if other == target:
                 best, last = there, new
-                continue
-            ahead = octile(ci + count * si - goal_i, cj + count * sj - goal_j, ck + count * sk - goal_k)
-            if there + ahead >= best - _SAME:
                 continue
             rank = max(int((there + ahead - least) * _PER_VOXEL), level)
             while rank >= stack.shape[0]:

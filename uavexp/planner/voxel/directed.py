@@ -21,8 +21,9 @@ import numba as nb
 import numpy as np
 
 from uavexp.planner.voxel.canonical import BUDGET, FOUND, NO_PATH
-from uavexp.planner.voxel.moves import LENGTHS, STEPS, neighbourhood, octile, open_moves
-from uavexp.types import Float, Int, Int32, UInt8
+from uavexp.planner.voxel.jump import neighbourhood
+from uavexp.planner.voxel.moves import LENGTHS, STEPS, octile, open_moves
+from uavexp.types import Bool, Float, Int, Int32, UInt8
 
 RULE_NONE, RULE_OR, RULE_AND = 0, 1, 2
 COUNT_MADE, COUNT_OPEN = 0, 1  # readings of N_horizontal
@@ -67,7 +68,17 @@ def _place(table: Int, key_of: Int, key: int) -> int:
     place = (key * 0x9E3779B1 >> 12) & mask
     while table[place] >= 0 and key_of[table[place]] != key:
         place = (place + 1) & mask
-    return place
+    return int(place)
+
+
+@nb.njit(cache=True)
+def _is_dominated(table: Int, key_of: Int, closed: Bool, key: int, made: int) -> bool:
+    """Whether the same cell and step were closed before, at no greater cost, with more level steps made."""
+    for more in range(1, 6 - made):
+        other = table[_place(table, key_of, key + more)]
+        if other >= 0 and closed[other]:
+            return True
+    return False
 
 
 @nb.njit(cache=True)
@@ -112,7 +123,7 @@ def _longer(array: Int) -> Int:
 
 @nb.njit(cache=True)
 def find_directed(
-    state: UInt8,
+    free: UInt8,
     shape: Int,
     start: Int,
     goal: Int,
@@ -126,7 +137,7 @@ def find_directed(
     """Return status, objective in voxels (paper: length and first cost), expansions, cells (P, 3).
 
     Args:
-        state: flat grid, padded by a blocked border.
+        free: bits of the padded grid (`jump.Terrain`).
         shape: of the padded grid (3,).
         start: padded index (3,), free.
         goal: padded index (3,), free.
@@ -162,6 +173,8 @@ def find_directed(
         if closed[node]:
             continue
         closed[node] = True
+        if counts and _is_dominated(table, key_of, closed, key_of[node], made[node]):
+            continue
         cell = cell_of[node]
         if cell == target:
             return FOUND, cost[node], expansions, _trace(node, cell_of, parent, row, slab)
@@ -170,7 +183,7 @@ def find_directed(
         expansions += 1
         ci, cj, ck = cell // slab, cell % slab // row, cell % row
         before = arrived[node]
-        moves = open_moves(neighbourhood(state, cell, row, slab))
+        moves = open_moves(neighbourhood(free, shape, ci, cj, ck))
         if not _may_climb(rule, reading, moves, ck - goal[2], made[node]):
             moves &= LEVEL
         for n in range(27):

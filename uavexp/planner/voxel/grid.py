@@ -25,6 +25,11 @@ class VoxelPath(NamedTuple):
     expansions: int
 
     @property
+    def centres(self) -> Float:
+        """Centres (P, 3) of the cells, in voxels from the grid's corner."""
+        return np.asarray(self.cells + 0.5, dtype=np.float64)
+
+    @property
     def found(self) -> bool:
         """Whether there is a path."""
         return self.status == canonical.FOUND
@@ -51,7 +56,7 @@ class VoxelGrid:
 
     def __post_init__(self) -> None:
         self.terrain = survey(self.free)
-        self._slot = np.zeros(self.terrain.state.size, dtype=np.int32)
+        self._slot = np.empty(int(self.terrain.shape.prod()), dtype=np.int32)
         self._slot.fill(0)  # so that no search pays for the first touch of its memory
 
     def shortest(self, start: Int, goal: Int, max_expansions: int = NO_LIMIT) -> VoxelPath:
@@ -75,7 +80,7 @@ class VoxelGrid:
             return VoxelPath(canonical.NO_PATH, np.inf, np.empty((0, 3), dtype=np.int32), 0)
         terms = (wish.exact, wish.turn_weight, _first_costs(wish), wish.rule, wish.reading)
         status, cost, expansions, cells = find_directed(
-            self.terrain.state, self.terrain.shape, start + 1, goal + 1, *terms, max_expansions
+            self.terrain.free, self.terrain.shape, start + 1, goal + 1, *terms, max_expansions
         )
         return VoxelPath(status, cost, cells - 1, expansions)
 

@@ -83,7 +83,7 @@ def live_grid(
 
 def in_metres(field: DistanceField, grid: LiveGrid, points: Float, start_m: Float, goal_m: Float) -> Float:
     """Path (P, 3) of points in cells (`smoothing`: centres at + 0.5), with the exact ends."""
-    path = field.origin_m + (grid.first + points) * field.voxel_size_m
+    path: Float = field.origin_m + (grid.first + points) * field.voxel_size_m
     if len(path) < 2:
         return np.stack([start_m, goal_m])
     return np.concatenate([start_m[None], path[1:-1], goal_m[None]])

@@ -20,9 +20,8 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
-from uavexp.types import Float, Int, UInt8
+from uavexp.types import Float, Int
 
-BLOCKED, NEAR, CLEAR = 0, 1, 3  # of a cell: not free; free; free with all 26 neighbours
 STAY = 13
 MOVES = 27
 FULL = (1 << MOVES) - 1
@@ -91,27 +90,6 @@ def octile(di: int, dj: int, dk: int) -> float:
     return most + 0.41421356237309515 * middle + 0.31783724519578205 * least
 
 
-@nb.njit(cache=True, inline="always")
-def neighbourhood(state: UInt8, cell: int, row: int, slab: int) -> int:
-    """Which of the 27 cells around a cell of the padded grid are free, as bits.
-
-    Args:
-        state: flat padded grid.
-        cell: flat index, not on the border.
-        row: cells from one j to the next.
-        slab: cells from one i to the next.
-    """
-    bits, bit = 0, 1
-    for di in range(-1, 2):
-        for dj in range(-1, 2):
-            base = cell + di * slab + dj * row
-            for dk in range(-1, 2):
-                if state[base + dk] != 0:
-                    bits |= bit
-                bit <<= 1
-    return bits
-
-
 @nb.njit(cache=True)
 def open_moves(bits: int) -> int:
     """Which moves a neighbourhood leaves open, as bits (staying is none)."""
@@ -119,7 +97,7 @@ def open_moves(bits: int) -> int:
     for n in range(27):
         if n != 13 and bits & BOXES[n] == BOXES[n]:
             moves |= 1 << n
-    return moves
+    return int(moves)
 
 
 @nb.njit(cache=True)
@@ -142,4 +120,4 @@ def canonical_moves(arrived: int, bits: int) -> int:
                     break
                 if need > 0x7FFFFFF:
                     break
-    return moves
+    return int(moves)
