@@ -205,7 +205,8 @@ def _reset(parts: Parts, world: World, scene: Scene, start: State, seed: int, wa
     parts.controller.reset(limits, parts.vehicle.mass_kg)
     parts.vehicle.reset(start)
     parts.safety.reset(limits)
-    parts.mission.reset(world, scene, limits)
+    with watch.lap("mission"):
+        parts.mission.reset(world, scene, limits)
     guide = parts.mission.guide(parts.explorer)
     guide.reset(float(world.start_m[2]), limits)
     return Pilot(

@@ -158,7 +158,7 @@ def test_a_preset_only_overrides(preset: str) -> None:
 
 def test_presets_differ_in_the_trigger_and_in_the_goal_of_a_single_shot_only() -> None:
     """Those of the other papers are apart: movers with another sensor, another planner."""
-    alike = [preset for preset in PRESETS if preset not in ("risk", "bspline_mpc")]
+    alike = [preset for preset in PRESETS if preset not in ("risk", "bspline_mpc", "inspect")]
     cells = [COMPOSER.cell(parse_settings([f"{PRESET_GROUP}={preset}"])) for preset in alike]
     shared = [
         {

@@ -139,7 +139,7 @@ class TestSuccess:
         clean = evaluate(make_log(line, line_velocity, outcome=outcome), WORLD)
         touched = evaluate(make_log(line, line_velocity, outcome=outcome, contacts=touch), WORLD)
         assert clean["outcome"] == outcome.value
-        assert clean["success"] is (outcome in (Outcome.REACHED, Outcome.EXPLORED))
+        assert clean["success"] is (outcome in (Outcome.REACHED, Outcome.EXPLORED, Outcome.INSPECTED))
         assert touched["success"] is False
 
 

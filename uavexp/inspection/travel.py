@@ -10,7 +10,6 @@ import numba as nb
 import numpy as np
 
 from uavexp.inspection.lattice import EDGE_UNITS, Lattice
-from uavexp.inspection.lattice import lattice_of as lattice_of  # importers of both take it from here
 from uavexp.types import Bool, Float, Float32, Int, Int32
 
 _FINE_UNITS = 8000  # the same between points, where edges are long
