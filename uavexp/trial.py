@@ -133,9 +133,7 @@ def fly(parts: Parts, world: World, seed: int, progress: Progress | None = None)
     last_step = math.ceil(parts.mission.time_limit_s / parts.step_s)
     stuck_steps = math.ceil(parts.stuck_s / parts.step_s)
     outcome: Outcome | None = None
-    tracks = Tracks.none()
-
-    bodies = parts.movers.at(0.0)
+    tracks, bodies = Tracks.none(), parts.movers.at(0.0)
     scene.place(bodies)
 
     for step in range(last_step + 1):
