@@ -20,8 +20,9 @@ from typing import Any
 VARIABLE = "NUMBA_CACHE_LOCATOR_CLASSES"
 LOCATOR = "uavexp.kernel_cache.KernelLocator"
 _PACKAGE = Path(__file__).resolve().parent
+# not the indented ones: what is imported for type checking alone, or inside a function, is in no kernel
 _IMPORT = re.compile(
-    r"^\s*(?:from\s+(?P<module>uavexp[\w.]*)\s+import\s+(?P<names>\([^)]*\)|[^\n#]*)|import\s+(?P<plain>uavexp[\w.]*))",
+    r"^(?:from\s+(?P<module>uavexp[\w.]*)\s+import\s+(?P<names>\([^)]*\)|[^\n#]*)|import\s+(?P<plain>uavexp[\w.]*))",
     re.MULTILINE,
 )
 

@@ -23,6 +23,7 @@ from uavexp.planner.smoothing.clearance import shortcut
 from uavexp.planner.smoothing.corridor import Corridor, make_corridor
 from uavexp.planner.smoothing.quadratic import NO_CUTS, Problem, solve
 from uavexp.planner.smoothing.time_law import TimeLaw
+from uavexp.planner.smoothing.waypoint_spline import WaypointSpline
 from uavexp.planner.timing import resample
 from uavexp.types import Bool, Float, Goal, Limits, PlanRequest, PlanStatus
 
@@ -284,7 +285,8 @@ def test_bad_input_has_a_status(change: dict[str, Any], status: PlanStatus) -> N
 def test_smoothers_by_name() -> None:
     assert make_smoother("bspline_qp", "snap") == BsplineSmoother(derivative=Derivative.SNAP)
     assert make_smoother("none") == TimeLaw()
-    with pytest.raises(ConfigError, match=r"smoothing must be bspline_qp \| none, got 'spline'"):
+    assert make_smoother("waypoint_spline") == WaypointSpline()
+    with pytest.raises(ConfigError, match=r"smoothing must be .* waypoint_spline, got 'spline'"):
         make_smoother("spline")
     with pytest.raises(ConfigError, match=r"derivative must be acceleration \| jerk \| snap, got 'crackle'"):
         BsplineQp(derivative="crackle")  # type: ignore[arg-type]

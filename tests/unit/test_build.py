@@ -193,7 +193,7 @@ def test_a_grid_composes_each_combination_of_options_once() -> None:
     assert [(item.strategy, item.config["world"]["flight_height_m"]) for item in cells] == [
         (strategy, height) for strategy in ("mcr", "tbr") for height in (1.0, 1.1, 1.2)
     ]
-    assert len(composer._cache) == 2
+    assert len(composer._trees._cache) == 2
 
 
 def test_a_value_typed_wins_over_the_preset() -> None:
