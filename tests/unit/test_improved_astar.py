@@ -94,7 +94,7 @@ def test_an_exhausted_budget_falls_back_and_says_so() -> None:
     free[12:15, :25] = False
     grid, ends = VoxelGrid(free), (np.array([5, 5, 4]), np.array([25, 5, 4]))
     budget = grid.shortest(*ends).expansions
-    planner = ImprovedAstar(max_expansions=budget)
+    planner = ImprovedAstar(max_expansions=budget, form="exact")
     answer, remark = planner.search(grid, *ends, planner.wish(0.1))
     assert answer.found
     assert remark == f"plain A*: not found in {budget} expansions"

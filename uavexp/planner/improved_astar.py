@@ -73,7 +73,7 @@ class ImprovedAstar:
     z_band_m: float = 0.3
     unknown: str = "optimistic"
     max_expansions: int = 300_000
-    form: Form = Form.EXACT
+    form: Form = Form.PAPER
     turn_weight: float = 0.5
     weight_unit: WeightUnit = WeightUnit.VOXELS
     first_step_weight: float = 2.0

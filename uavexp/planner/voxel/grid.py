@@ -56,7 +56,7 @@ class VoxelGrid:
 
     def __post_init__(self) -> None:
         self.terrain = survey(self.free)
-        self._slot = np.empty(int(self.terrain.shape.prod()), dtype=np.int32)
+        self._slot = np.empty(canonical.slots(self.terrain.shape), dtype=np.int32)
         self._slot.fill(0)  # so that no search pays for the first touch of its memory
 
     def shortest(self, start: Int, goal: Int, max_expansions: int = NO_LIMIT) -> VoxelPath:

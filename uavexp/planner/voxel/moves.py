@@ -108,7 +108,7 @@ def canonical_moves(arrived: int, bits: int) -> int:
         arrived: move by which the cell was reached; `STAY` at the start, where all are kept.
         bits: its neighbourhood.
     """
-    moves = open_moves(bits)
+    moves = int(open_moves(bits))
     if arrived == 13:
         return moves
     for n in range(27):
@@ -120,4 +120,4 @@ def canonical_moves(arrived: int, bits: int) -> int:
                     break
                 if need > 0x7FFFFFF:
                     break
-    return int(moves)
+    return moves
