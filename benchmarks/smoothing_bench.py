@@ -19,9 +19,9 @@ from uavexp.planner.free_space import FreeSpace, free_space
 from uavexp.planner.search import PathSearch
 from uavexp.planner.smoothing.basis import make_basis
 from uavexp.planner.smoothing.bspline_qp import BsplineSmoother, Derivative
-from uavexp.planner.smoothing.clearance import shortcut
 from uavexp.planner.smoothing.corridor import make_corridor
 from uavexp.planner.smoothing.quadratic import NO_CUTS, Problem, Solution, solve
+from uavexp.planner.smoothing.shortcut import shortcut
 from uavexp.planner.timing import resample, smooth, time_profile
 from uavexp.types import Float, Goal, Limits, PlanRequest, PlanStatus
 

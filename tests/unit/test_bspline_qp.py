@@ -19,9 +19,9 @@ from uavexp.planner.free_space import free_space
 from uavexp.planner.smoothing import make_smoother
 from uavexp.planner.smoothing.basis import Basis, end_points, make_basis, to_trajectory
 from uavexp.planner.smoothing.bspline_qp import BsplineSmoother, Derivative
-from uavexp.planner.smoothing.clearance import shortcut
 from uavexp.planner.smoothing.corridor import Corridor, make_corridor
 from uavexp.planner.smoothing.quadratic import NO_CUTS, Problem, solve
+from uavexp.planner.smoothing.shortcut import shortcut
 from uavexp.planner.smoothing.time_law import TimeLaw
 from uavexp.planner.smoothing.waypoint_spline import WaypointSpline
 from uavexp.planner.timing import resample

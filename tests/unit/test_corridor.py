@@ -12,8 +12,8 @@ from scipy.spatial import cKDTree
 from tests.fields import bounds, box, empty, field_from, warehouse
 from uavexp.planner.free_space import free_space, straight_is_free
 from uavexp.planner.search import PathSearch
-from uavexp.planner.smoothing.clearance import shortcut
 from uavexp.planner.smoothing.corridor import Corridor, make_corridor
+from uavexp.planner.smoothing.shortcut import shortcut
 from uavexp.planner.timing import resample
 from uavexp.types import Float
 

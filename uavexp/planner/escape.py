@@ -8,7 +8,7 @@ import numpy as np
 
 from uavexp.geometry import evaluate
 from uavexp.planner.brake import braking_trajectory
-from uavexp.planner.optimise import Settings, moving_obstacles, shortfall
+from uavexp.planner.optimise import Settings, fixed_shortfall, moving_obstacles
 from uavexp.planner.spline import join
 from uavexp.types import Limits, PlanRequest, Trajectory
 
@@ -35,7 +35,7 @@ def safest_stop(request: PlanRequest, settings: Settings, limits: Limits) -> tup
     best, best_m = 0, -np.inf
     for index, way in enumerate(ways):
         points_m = evaluate(way, times_s)[0]
-        if shortfall(request, settings, points_m):
+        if fixed_shortfall(request, settings, points_m):
             continue
         clearance_m = float(moving.clearance_m(points_m, times_s).min())
         if index == 0 and clearance_m >= 0.0:

@@ -30,7 +30,7 @@ All budgets are iterations; the answer depends on the request and nothing else.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -39,9 +39,10 @@ from uavexp.geometry import GRAVITY_MPS2, evaluate, sample_times
 from uavexp.mapping.base import DistanceField
 from uavexp.planner.brake import braking_trajectory
 from uavexp.planner.escape import safest_stop
-from uavexp.planner.optimise import CONTROL_POINTS, Settings, moving_obstacles, optimise, shortfall
+from uavexp.planner.optimise import CONTROL_POINTS, Settings, fixed_shortfall, moving_obstacles, optimise
 from uavexp.planner.search import Finder, PathSearch
-from uavexp.planner.spline import join, spline_model, to_trajectory
+from uavexp.planner.spline import spline_model, to_trajectory
+from uavexp.planner.stop_first import stop_first, summed
 from uavexp.types import Limits, PlanRequest, PlanResult, PlanStatus, Trajectory
 
 _MENDED_BY_BRAKING = (PlanStatus.NOT_CLEAR, PlanStatus.LIMITS, PlanStatus.SOLVER)
@@ -173,7 +174,7 @@ class MinAcc:
     ) -> PlanResult:
         """Pass closer; else stop or step aside, and go on from there."""
         closer = settings._replace(mover_margin=_CLOSER * settings.mover_margin)
-        result = _summed(failed, self._attempt(request, closer, search), "passes movers closely")
+        result = summed(failed, self._attempt(request, closer, search), "passes movers closely")
         if result.trajectory is not None:
             return result
         stop, aside = safest_stop(request, settings, limits)
@@ -222,33 +223,11 @@ class MinAcc:
     ) -> PlanResult:
         """Stop, then fly from there; the failure of the direct attempt when that fails, too."""
         way = evaluate(stop, sample_times(stop, stop.start_s, _BRAKE_CHECK_S))[0]
-        if shortfall(request, settings, way):
+        if fixed_shortfall(request, settings, way):
             return failed
-        standing = replace(
-            request,
-            time_s=stop.end_s,
-            position_m=way[-1],
-            velocity_mps=np.zeros(3),
-            acceleration_mps2=np.zeros(3),
+        return stop_first(
+            request, stop, way[-1], lambda standing: self._attempt(standing, settings, search), failed, reason
         )
-        onward = self._attempt(standing, settings, search)
-        if onward.trajectory is None:
-            return _summed(failed, onward, reason)
-        path_m = np.concatenate([request.position_m[None], onward.path_m])
-        joined = replace(onward, trajectory=join(stop, onward.trajectory), path_m=path_m)
-        return _summed(failed, joined, reason)
-
-
-def _summed(failed: PlanResult, then: PlanResult, reason: str) -> PlanResult:
-    """The second answer, for this reason, or the first failure when it is none; with the work of both."""
-    answer = failed if then.trajectory is None else replace(then, reason=reason)
-    return replace(
-        answer,
-        iterations=failed.iterations + then.iterations,
-        expansions=failed.expansions + then.expansions,
-        wall_search_s=failed.wall_search_s + then.wall_search_s,
-        wall_optimise_s=failed.wall_optimise_s + then.wall_optimise_s,
-    )
 
 
 def _field_with_movers(request: PlanRequest, settings: Settings) -> DistanceField:

@@ -9,6 +9,7 @@ import daqp
 import numpy as np
 
 from uavexp.mapping.base import DistanceField
+from uavexp.planner.clearance import shortfall
 from uavexp.planner.moving import MovingObstacles
 from uavexp.planner.scp import limit_rows, line_search, quadratic_model
 from uavexp.planner.spline import (
@@ -33,7 +34,6 @@ _STRETCH_GAIN = 0.99  # stretching ends unless it takes the excess below this sh
 _SHORTEST_S = 0.2  # of a trajectory to where the vehicle is: h² of a shorter one drowns in rounding
 _RETIME = 0.03  # relative change of duration that is worth placing the control points anew
 _HARD_ABOVE_VOXELS = 0.5  # the steep part of the obstacle cost begins this far above the hard limit
-_START_SLACK_M = 0.01  # by which a start below the hard limit may come closer still
 _REST_MPS = 0.05  # a slower start counts as standing
 _UNKNOWN_TETHER = 400.0  # of samples within a voxel of unknown space, when that is not to be entered
 _AROUND = np.vstack([np.zeros(3), np.eye(3), -np.eye(3)])
@@ -308,7 +308,13 @@ def curve_shortfall(request: PlanRequest, settings: Settings, curve: Curve) -> s
     per_segment = max(math.ceil(longest / (0.5 * request.field.voxel_size_m)), 1)
     points = sample_spline(curve.control, per_segment)
     times = request.time_s + np.arange(len(points), dtype=np.float64) * (curve.h / per_segment)
-    return shortfall(request, settings, points) or mover_shortfall(request, settings, points, times)
+    return fixed_shortfall(request, settings, points) or mover_shortfall(request, settings, points, times)
+
+
+def fixed_shortfall(request: PlanRequest, settings: Settings, points: Float) -> str:
+    """Say where a curve through points (P, 3) is not clear of the map (`clearance.shortfall`)."""
+    limits = (settings.min_clearance, settings.max_acceleration)
+    return shortfall(request, points, *limits, settings.known_only)
 
 
 def moving_obstacles(request: PlanRequest, settings: Settings) -> MovingObstacles:
@@ -324,37 +330,3 @@ def moving_obstacles(request: PlanRequest, settings: Settings) -> MovingObstacle
 def mover_shortfall(request: PlanRequest, settings: Settings, points: Float, times: Float) -> str:
     """Say where a curve through points (P, 3) at times (P,) is too near to a mover; empty when it is not."""
     return moving_obstacles(request, settings).shortfall(points, times, settings.max_acceleration)
-
-
-def shortfall(request: PlanRequest, settings: Settings, points: Float) -> str:
-    """Say where a curve through these points (P, 3) from the request's start is not clear.
-
-    A start below the hard limit may come no closer to the obstacle than its speed towards it
-    makes unavoidable; once it has reached the limit it keeps it.
-    """
-    field, bounds = request.field, request.flight_bounds_m
-    clearance = field.distance_m(points)
-    enough = clearance >= settings.min_clearance
-    if not enough[0]:
-        escaped = int(np.argmax(enough)) if enough.any() else len(points)
-        towards = max(-float(field.gradient(points[:1])[0] @ request.velocity_mps), 0.0)
-        stop_m = towards**2 / (2.0 * settings.max_acceleration)
-        enough[:escaped] = clearance[:escaped] >= max(clearance[0] - stop_m - _START_SLACK_M, 0.0)
-    if not enough.all():
-        worst = int(np.argmin(np.where(enough, np.inf, clearance)))
-        return f"clearance {clearance[worst]:.2f} m at {_text(points[worst])}"
-    # a start outside the bounds may come back, not go further
-    low, high = np.minimum(bounds[0], points[0]) - 1e-6, np.maximum(bounds[1], points[0]) + 1e-6
-    outside = ((points < low) | (points > high)).any(axis=1)
-    if outside.any():
-        return f"leaves the flight bounds at {_text(points[int(np.argmax(outside))])}"
-    if settings.known_only:
-        known = field.observed(points)
-        known[: int(np.argmax(known))] = True  # a start in unknown space may leave it
-        if not known.all():
-            return f"enters unknown space at {_text(points[int(np.argmin(known))])}"
-    return ""
-
-
-def _text(point: Float) -> str:
-    return "(" + ", ".join(f"{value:.2f}" for value in point) + ") m"

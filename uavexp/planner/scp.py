@@ -42,7 +42,8 @@ _FAN = np.array(
 
 
 @nb.njit(cache=True, inline="always")
-def _cost(distance_m: float, safe_m: float, hard_m: float) -> float:
+def clearance_cost(distance_m: float, safe_m: float, hard_m: float) -> float:
+    """c(d) = (1 - d/safe)₊² + 10 ((hard - d)/safe)₊² of a clearance d, m."""
     soft = max(1.0 - distance_m / safe_m, 0.0)
     hard = max((hard_m - distance_m) / safe_m, 0.0)
     return soft * soft + HARD_WEIGHT * hard * hard
@@ -82,7 +83,7 @@ def merit(
     _heed(movers, points, 1, h, weights[3], d)
     share = h / SAMPLES
     for k in range(points.shape[0]):
-        total += weights[0] * share * _cost(d[k], weights[1], weights[2])
+        total += weights[0] * share * clearance_cost(d[k], weights[1], weights[2])
         if tether_weight[k] > 0.0:
             total += tether_weight[k] * share * ((points[k] - tether_m[k]) ** 2).sum()
     return float(total)
@@ -199,10 +200,10 @@ def quadratic_model(
     slope, bend = np.empty(3), np.empty((3, 3))
     for k in range(count):
         slope[:], bend[:] = 0.0, 0.0
-        middle = _cost(d[7 * k], weights[1], weights[2])
+        middle = clearance_cost(d[7 * k], weights[1], weights[2])
         for e in range(3):
-            ahead = _cost(d[7 * k + 1 + 2 * e], weights[1], weights[2])
-            behind = _cost(d[7 * k + 2 + 2 * e], weights[1], weights[2])
+            ahead = clearance_cost(d[7 * k + 1 + 2 * e], weights[1], weights[2])
+            behind = clearance_cost(d[7 * k + 2 + 2 * e], weights[1], weights[2])
             first = weights[0] * (ahead - behind) / (2.0 * voxel_m)
             second = weights[0] * max(ahead - 2.0 * middle + behind, 0.0) / voxel_m**2
             for a in range(3):

@@ -23,6 +23,7 @@ import numpy as np
 from uavexp.errors import require, require_non_negative, require_positive
 from uavexp.geometry import rotation_from_quaternion
 from uavexp.scene import Scene
+from uavexp.sensor.mount import require_mount
 from uavexp.types import Float, Float32, RayScan, State
 
 
@@ -49,14 +50,7 @@ class LidarParameters:
             0.0 <= self.missing_probability < 1.0,
             f"missing_probability must be >= 0 and < 1, got {self.missing_probability}",
         )
-        require(
-            len(self.mount_offset_m) == 3 and all(math.isfinite(x) for x in self.mount_offset_m),
-            f"mount_offset_m must be three finite numbers [x, y, z], got {list(self.mount_offset_m)}",
-        )
-        require(
-            -90.0 <= self.mount_pitch_deg <= 90.0,
-            f"mount_pitch_deg must be -90 to 90 deg, got {self.mount_pitch_deg}",
-        )
+        require_mount(self.mount_offset_m, self.mount_pitch_deg)
 
     def pose(self, state: State) -> tuple[Float, Float]:
         """World position (3,) and sensor-to-world rotation (3, 3) of the sensor on a vehicle."""

@@ -31,6 +31,7 @@ import numpy as np
 from uavexp.errors import require, require_non_negative, require_positive
 from uavexp.geometry import rotation_from_quaternion
 from uavexp.scene import Scene
+from uavexp.sensor.mount import require_mount
 from uavexp.types import DepthScan, Float, Float32, State
 
 
@@ -171,14 +172,7 @@ class Rgbd:
             self.min_range_m < self.max_range_m,
             f"min_range_m must be < max_range_m = {self.max_range_m}, got {self.min_range_m}",
         )
-        require(
-            len(self.mount_offset_m) == 3 and all(math.isfinite(x) for x in self.mount_offset_m),
-            f"mount_offset_m must be three finite numbers [x, y, z], got {list(self.mount_offset_m)}",
-        )
-        require(
-            -90.0 <= self.mount_pitch_deg <= 90.0,
-            f"mount_pitch_deg must be -90 to 90 deg, got {self.mount_pitch_deg}",
-        )
+        require_mount(self.mount_offset_m, self.mount_pitch_deg)
         require(
             0.0 <= self.edge_missing_probability <= 1.0,
             f"edge_missing_probability must be 0 to 1, got {self.edge_missing_probability}",

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from uavexp.geometry import evaluate
 from uavexp.planner.brake import braking_trajectory, stopping_distance_m
+from uavexp.planner.clearance import shortfall
 from uavexp.planner.mpc.static_problem import Settings
 from uavexp.planner.mpc.static_spline import START_EXCESS, instants, shape_spline
 from uavexp.planner.search import PathSearch
-from uavexp.planner.smoothing.clearance import shortfall
-from uavexp.planner.spline import join
+from uavexp.planner.stop_first import stop_first
 from uavexp.types import Float, Goal, PlanRequest, PlanResult, PlanStatus, Trajectory
 
 _MENDED_BY_BRAKING = (PlanStatus.NOT_CLEAR, PlanStatus.LIMITS, PlanStatus.SOLVER)
@@ -59,26 +59,7 @@ class StaticPlanner:
         way = evaluate(stop, instants(stop))[0]
         if self.shortfall(request, way):
             return failed
-        standing = replace(
-            request,
-            time_s=stop.end_s,
-            position_m=way[-1],
-            velocity_mps=np.zeros(3),
-            acceleration_mps2=np.zeros(3),
-        )
-        onward = self._attempt(standing)
-        answer = failed
-        if onward.trajectory is not None:
-            path = np.concatenate([request.position_m[None], onward.path_m])
-            joined = join(stop, onward.trajectory)
-            answer = replace(onward, trajectory=joined, path_m=path, reason="brakes first")
-        return replace(
-            answer,
-            iterations=failed.iterations + onward.iterations,
-            expansions=failed.expansions + onward.expansions,
-            wall_search_s=failed.wall_search_s + onward.wall_search_s,
-            wall_optimise_s=failed.wall_optimise_s + onward.wall_optimise_s,
-        )
+        return stop_first(request, stop, way[-1], self._attempt, failed, "brakes first")
 
     def shortfall(self, request: PlanRequest, points_m: Float) -> str:
         """Say where a curve through these points (P, 3) meets a mapped obstacle; "" when it does not."""

@@ -6,9 +6,9 @@ import numba as nb
 import numpy as np
 
 from uavexp.mapping.field import value_and_gradient
+from uavexp.planner.scp import clearance_cost
 from uavexp.types import Float, Float32
 
-_HARD_WEIGHT = 10.0
 # half spaces around a vector, in (along, level across, up from both): towards it and 24° from it
 FAN = np.array(
     [
@@ -38,13 +38,6 @@ def frames(vectors: Float) -> Float:
     return out
 
 
-@nb.njit(cache=True, inline="always")
-def _cost(distance_m: float, safe_m: float, hard_m: float) -> float:
-    soft = max(1.0 - distance_m / safe_m, 0.0)
-    hard = max((hard_m - distance_m) / safe_m, 0.0)
-    return soft * soft + _HARD_WEIGHT * hard * hard
-
-
 @nb.njit(cache=True)
 def obstacle_cost(
     points: Float, distance: Float32, origin_m: Float, voxel_m: float, safe_m: float, hard_m: float
@@ -53,7 +46,7 @@ def obstacle_cost(
     d, _ = value_and_gradient(distance, origin_m, voxel_m, points)
     total = 0.0
     for k in range(len(points)):
-        total += _cost(d[k], safe_m, hard_m)
+        total += clearance_cost(d[k], safe_m, hard_m)
     return total
 
 
@@ -82,10 +75,10 @@ def obstacle_model(
             around[7 * k + 2 + 2 * e] = points[k] - voxel_m * frame[k, e]
     d, _ = value_and_gradient(distance, origin_m, voxel_m, around)
     for k in range(count):
-        middle = _cost(d[7 * k], safe_m, hard_m)
+        middle = clearance_cost(d[7 * k], safe_m, hard_m)
         for e in range(3):
-            ahead = _cost(d[7 * k + 1 + 2 * e], safe_m, hard_m)
-            behind = _cost(d[7 * k + 2 + 2 * e], safe_m, hard_m)
+            ahead = clearance_cost(d[7 * k + 1 + 2 * e], safe_m, hard_m)
+            behind = clearance_cost(d[7 * k + 2 + 2 * e], safe_m, hard_m)
             first = (ahead - behind) / (2.0 * voxel_m)
             second = max(ahead - 2.0 * middle + behind, 0.0) / voxel_m**2
             for a in range(3):

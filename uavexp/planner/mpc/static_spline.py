@@ -23,9 +23,10 @@ from typing import NamedTuple
 import numpy as np
 
 from uavexp.geometry import evaluate
+from uavexp.planner.clearance import shortfall
 from uavexp.planner.mpc.static_problem import Curve, Problem, Settings, minimise
 from uavexp.planner.mpc.uniform import make_uniform, pin_ends, to_trajectory
-from uavexp.planner.smoothing.clearance import shortfall
+from uavexp.planner.optimise import LADDER, Rung
 from uavexp.planner.timing import STEP_M, resample, smooth, time_profile
 from uavexp.types import Float, Limits, PlanRequest, PlanStatus, Trajectory
 
@@ -38,24 +39,6 @@ _CHECKED_SHARE = 0.999  # of the limits: room for what lies between two checked 
 _STRETCH, _STRETCHES, _STRETCH_GAIN = 1.06, 12, 0.99
 _SHORTEST_S = 0.2  # of a trajectory to where the vehicle is
 _REST_MPS = 0.05  # a slower start counts as standing
-
-
-class Rung(NamedTuple):
-    """One try of the ladder."""
-
-    weight: float  # factor on the obstacle weight
-    slower: float  # factor on the duration
-    finer: float  # factor on the number of control points
-    tether: float  # pull to the path: acceleration² that a deviation of 1 m is worth
-    from_rest: bool  # whether it only makes sense from a standing start
-
-
-LADDER = (
-    Rung(1.0, 1.0, 1.0, 0.0, False),
-    Rung(2.0, 1.15, 1.5, 0.0, False),
-    Rung(4.0, 1.4, 1.5, 50.0, True),
-    Rung(8.0, 2.0, 2.0, 400.0, True),
-)
 
 
 class Shaped(NamedTuple):

@@ -30,10 +30,10 @@ import numpy as np
 from uavexp.errors import require, require_non_negative, require_option, require_positive
 from uavexp.geometry import evaluate, sample_times
 from uavexp.planner.brake import braking_trajectory, stopping_distance_m
+from uavexp.planner.clearance import shortfall
 from uavexp.planner.free_space import straight_is_free
 from uavexp.planner.smoothing.base import SmoothResult
 from uavexp.planner.smoothing.basis import Basis, make_basis, to_trajectory
-from uavexp.planner.smoothing.clearance import shortfall
 from uavexp.planner.smoothing.corridor import make_corridor
 from uavexp.planner.smoothing.course import TANGENT_M, Task, at_shares, course, space_of
 from uavexp.planner.smoothing.quadratic import NO_CUTS, Problem, solve

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uavexp.planner.free_space import FreeSpace, free_space, straight_is_free
-from uavexp.planner.smoothing.clearance import shortcut
+from uavexp.planner.smoothing.shortcut import shortcut
 from uavexp.planner.timing import STEP_M, resample, smooth, time_profile
 from uavexp.types import Float, Limits, PlanRequest
 

@@ -18,9 +18,10 @@ import numpy as np
 
 from uavexp.geometry import GRAVITY_MPS2, evaluate, sample_times
 from uavexp.planner.brake import braking_trajectory
+from uavexp.planner.clearance import shortfall
 from uavexp.planner.free_space import free_space
 from uavexp.planner.smoothing.base import SmoothResult
-from uavexp.planner.smoothing.clearance import shortcut, shortfall
+from uavexp.planner.smoothing.shortcut import shortcut
 from uavexp.planner.spline import join
 from uavexp.types import Float, Limits, PlanRequest, PlanStatus, Trajectory
 
