@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from uavexp.geometry import evaluate
+from uavexp.metrics import voxel_path
 from uavexp.scene import Scene
 from uavexp.types import Bool, Float, Trajectory, TrialLog, World
 
@@ -30,6 +31,7 @@ def measures(log: TrialLog, world: World) -> dict[str, float]:
     trajectory = planned(log)
     if trajectory is None:
         return dict.fromkeys(_NAMES, float("nan"))
+    path_m = log.plan_path_m
     count = int(np.ceil(trajectory.duration_s / GRID_S)) + 1
     times_s = np.linspace(trajectory.start_s, trajectory.end_s, count)
     position_m, velocity_mps, acceleration_mps2 = evaluate(trajectory, times_s)
@@ -38,8 +40,8 @@ def measures(log: TrialLog, world: World) -> dict[str, float]:
     clearance_m = Scene(world).fixed_distance_m(position_m)
     over = (speed_mps > _EXCESS * log.max_speed_mps) | (size_mps2 > _EXCESS * log.max_acceleration_mps2)
     values = (
-        _length_m(log.plan_path_m),
-        _length_m(position_m),
+        voxel_path.path_length(path_m),
+        voxel_path.path_length(position_m),
         trajectory.duration_s,
         float(speed_mps.max()),
         float(size_mps2.max()),
@@ -48,6 +50,10 @@ def measures(log: TrialLog, world: World) -> dict[str, float]:
         float(stretches(clearance_m < log.body_radius_m)),
         float(log.plan_collision_checks),
         float(log.replans[0].expansions) if log.replans else float("nan"),
+        float(voxel_path.height_reversals(path_m)),
+        voxel_path.excess_climb(path_m),
+        float(np.degrees(voxel_path.cumulative_heading_change_rad(path_m))),
+        float(np.degrees(voxel_path.mean_heading_change_rad(path_m))),
     )
     return dict(zip(_NAMES, values, strict=True))
 
@@ -63,6 +69,10 @@ _NAMES = (
     "plan_collisions",  # stretches on which that is less than the body's radius
     "plan_collision_checks",
     "plan_iterations",  # of the search: nodes expanded, edges taken, samples
+    "plan_path_height_reversals",  # of the searched path (`voxel_path`)
+    "plan_path_excess_climb_m",
+    "plan_path_heading_change_deg",  # summed
+    "plan_path_mean_heading_change_deg",  # of the places where it changes
 )
 
 
@@ -85,7 +95,3 @@ def _cost_at(iteration: Float, cost: Float, at: int) -> float:
 def stretches(flags: Bool) -> int:
     """Number of unbroken runs of True in flags (N,)."""
     return int(np.count_nonzero(np.diff(flags.astype(np.int8), prepend=0) == 1))
-
-
-def _length_m(points_m: Float) -> float:
-    return float(np.linalg.norm(np.diff(points_m, axis=0), axis=1).sum())

@@ -22,8 +22,8 @@ from uavexp.mapping.base import DistanceField
 from uavexp.planner.min_acc import MinAcc
 from uavexp.planner.search import FoundPath
 from uavexp.planner.voxel import live
-from uavexp.planner.voxel.canonical import BUDGET
-from uavexp.types import Float, Limits, PlanRequest, PlanResult, PlanStatus
+from uavexp.planner.voxel.grid import VoxelGrid, VoxelPath
+from uavexp.types import Float, Int, Limits, PlanRequest, PlanResult
 
 
 @dataclass(slots=True, kw_only=True)
@@ -34,6 +34,7 @@ class Astar:
     z_band_m: float = 0.3
     unknown: str = "optimistic"
     max_expansions: int = 300_000
+    spline: bool = False
     movers: str = "current"
     mover_margin_m: float = 0.5
     mover_horizon_s: float = 2.0
@@ -75,27 +76,14 @@ class Astar:
 
     def find(self, field_: DistanceField, start_m: Float, goal_m: Float, bounds_m: Float) -> FoundPath:
         """Return the shortest path on the map (`search.Finder.find`)."""
-        refused = live.refusal(field_, start_m, goal_m, bounds_m, self.min_clearance_m)
-        if refused is not None:
-            return refused
-        grid = live.live_grid(
-            field_,
-            start_m,
-            goal_m,
-            bounds_m,
-            min_clearance_m=self.min_clearance_m,
-            z_band_m=self.z_band_m,
-            known_only=self.unknown == "conservative",
-        )
-        answer = live.surveyed(grid).shortest(grid.start, grid.goal, self.max_expansions)
-        if answer.status == BUDGET:
-            reason = f"not found in {self.max_expansions} expansions"
-            return live.failed(PlanStatus.NO_PATH, reason, answer.expansions)
-        if not answer.found:
-            reason = "start and goal are not joined at the clearance limit"
-            return live.failed(PlanStatus.NO_PATH, reason, answer.expansions)
-        path = live.in_metres(field_, grid, answer.centres, start_m, goal_m)
-        return live.found(path, answer.cost * field_.voxel_size_m, answer.expansions)
+        return live.find(
+            field_, start_m, goal_m, bounds_m, self._shortest,
+            min_clearance_m=self.min_clearance_m, z_band_m=self.z_band_m,
+            known_only=self.unknown == "conservative", spline=self.spline,
+        )  # fmt: skip
+
+    def _shortest(self, grid: VoxelGrid, start: Int, goal: Int) -> tuple[VoxelPath, str]:
+        return grid.shortest(start, goal, self.max_expansions), ""
 
 
 if __name__ == "__main__":

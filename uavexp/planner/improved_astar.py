@@ -11,8 +11,9 @@ budget; plain A* answers then, and the plan says so in its reason.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import partial
 
 import numpy as np
 
@@ -23,8 +24,7 @@ from uavexp.planner.search import FoundPath
 from uavexp.planner.voxel import directed, live
 from uavexp.planner.voxel.canonical import BUDGET
 from uavexp.planner.voxel.grid import Turning, VoxelGrid, VoxelPath
-from uavexp.planner.voxel.smoothing import smoothed
-from uavexp.types import Float, Int, Limits, PlanRequest, PlanResult, PlanStatus
+from uavexp.types import Float, Int, Limits, PlanRequest, PlanResult
 
 _SLOW_MPS = 0.1  # a slower start has no direction
 
@@ -79,6 +79,7 @@ class ImprovedAstar:
     first_step_weight: float = 2.0
     vertical_rule: VerticalRule = VerticalRule.OR
     n_horizontal: HorizontalCount = HorizontalCount.STEPS
+    spline: bool = True
     mover_margin_m: float = 0.5
     mover_horizon_s: float = 2.0
     _flight: MinAcc | None = field(default=None, init=False, repr=False)
@@ -146,24 +147,10 @@ class ImprovedAstar:
         return plain, "plain A*: the vertical rule leaves no path"
 
     def find(self, field_: DistanceField, start_m: Float, goal_m: Float, bounds_m: Float) -> FoundPath:
-        """Return the smoothed path on the map (`search.Finder.find`)."""
-        refused = live.refusal(field_, start_m, goal_m, bounds_m, self.min_clearance_m)
-        if refused is not None:
-            return refused
-        grid = live.live_grid(
-            field_,
-            start_m,
-            goal_m,
-            bounds_m,
-            min_clearance_m=self.min_clearance_m,
-            z_band_m=self.z_band_m,
-            known_only=self.unknown == "conservative",
-        )
+        """Return the path on the map (`search.Finder.find`)."""
         wish = self.wish(field_.voxel_size_m, self._velocity_mps)
-        answer, remark = self.search(live.surveyed(grid), grid.start, grid.goal, wish)
-        if not answer.found:
-            reason = "start and goal are not joined at the clearance limit, or the budget is spent"
-            return live.failed(PlanStatus.NO_PATH, reason, answer.expansions)
-        path = live.in_metres(field_, grid, smoothed(grid.free, answer.centres), start_m, goal_m)
-        found = live.found(path, answer.cost * field_.voxel_size_m, answer.expansions)
-        return replace(found, reason=remark)
+        return live.find(
+            field_, start_m, goal_m, bounds_m, partial(self.search, wish=wish),
+            min_clearance_m=self.min_clearance_m, z_band_m=self.z_band_m,
+            known_only=self.unknown == "conservative", spline=self.spline,
+        )  # fmt: skip

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from uavexp.mapping.base import DistanceField
 from uavexp.planner.search import FoundPath
-from uavexp.planner.voxel.grid import VoxelGrid
+from uavexp.planner.voxel.canonical import BUDGET
+from uavexp.planner.voxel.grid import VoxelGrid, VoxelPath
+from uavexp.planner.voxel.smoothing import smoothed
 from uavexp.types import Bool, Float, Int, PlanStatus
+
+Search = Callable[[VoxelGrid, Int, Int], tuple[VoxelPath, str]]  # cells (3,) to a path and a remark
 
 _RESERVE_VOXELS = 0.25  # clearance of cells above the limit: the curve's freedom
 _EXIT_VOXELS = 3.0  # a start too near to an obstacle may leave through cells as near, this far and further
@@ -24,15 +29,62 @@ class LiveGrid(NamedTuple):
     goal: Int  # (3,) cell
 
 
-def refusal(
+def find(
+    field: DistanceField,
+    start_m: Float,
+    goal_m: Float,
+    bounds_m: Float,
+    search: Search,
+    *,
+    min_clearance_m: float,
+    z_band_m: float,
+    known_only: bool,
+    spline: bool,
+) -> FoundPath:
+    """Path between two points (3,) on the map, by a search of its cells.
+
+    Args:
+        field: the map.
+        start_m: (3,).
+        goal_m: (3,).
+        bounds_m: (2, 3) that the path stays in.
+        search: of the cells; its remark is the reason of the answer.
+        min_clearance_m: of free cells.
+        z_band_m: by which the path may leave the heights between start and goal.
+        known_only: whether unknown cells are blocked.
+        spline: whether the key waypoints are joined by a quadratic spline (`smoothing`).
+    """
+    refused = _refusal(field, start_m, goal_m, bounds_m, min_clearance_m)
+    if refused is not None:
+        return refused
+    grid = live_grid(
+        field, start_m, goal_m, bounds_m,
+        min_clearance_m=min_clearance_m, z_band_m=z_band_m, known_only=known_only,
+    )  # fmt: skip
+    answer, remark = search(VoxelGrid(np.ascontiguousarray(grid.free)), grid.start, grid.goal)
+    if not answer.found:
+        spent = f"not found in {answer.expansions} expansions"
+        apart = "start and goal are not joined at the clearance limit"
+        return _failed(PlanStatus.NO_PATH, spent if answer.status == BUDGET else apart, answer.expansions)
+    points = smoothed(grid.free, answer.centres) if spline else answer.centres
+    return FoundPath(
+        status=PlanStatus.OK,
+        path_m=in_metres(field, grid, points, start_m, goal_m),
+        cost_m=answer.cost * field.voxel_size_m,
+        expansions=answer.expansions,
+        reason=remark,
+    )
+
+
+def _refusal(
     field: DistanceField, start_m: Float, goal_m: Float, bounds_m: Float, min_clearance_m: float
 ) -> FoundPath | None:
     """Why start or goal make every search vain; None when they do not."""
     here, there = field.distance_m(np.stack([start_m, goal_m]))
     if here <= 0.0:
-        return failed(PlanStatus.START_BLOCKED, f"the start lies {-here:.2f} m inside an obstacle")
+        return _failed(PlanStatus.START_BLOCKED, f"the start lies {-here:.2f} m inside an obstacle")
     if there < min_clearance_m or np.any(goal_m < bounds_m[0]) or np.any(goal_m > bounds_m[1]):
-        return failed(PlanStatus.GOAL_BLOCKED, f"the goal's clearance is {there:.2f} m, or it is outside")
+        return _failed(PlanStatus.GOAL_BLOCKED, f"the goal's clearance is {there:.2f} m, or it is outside")
     return None
 
 
@@ -89,17 +141,6 @@ def in_metres(field: DistanceField, grid: LiveGrid, points: Float, start_m: Floa
     return np.concatenate([start_m[None], path[1:-1], goal_m[None]])
 
 
-def found(path_m: Float, cost_m: float, expansions: int, reason: str = "") -> FoundPath:
-    """A path, and what is to be said about it."""
-    return FoundPath(status=PlanStatus.OK, path_m=path_m, cost_m=cost_m, expansions=expansions, reason=reason)
-
-
-def failed(status: PlanStatus, reason: str, expansions: int = 0) -> FoundPath:
-    """No path, and why."""
+def _failed(status: PlanStatus, reason: str, expansions: int = 0) -> FoundPath:
     none = np.zeros((0, 3))
     return FoundPath(status=status, path_m=none, cost_m=np.inf, expansions=expansions, reason=reason)
-
-
-def surveyed(grid: LiveGrid) -> VoxelGrid:
-    """The cells, made ready for searches."""
-    return VoxelGrid(np.ascontiguousarray(grid.free))
