@@ -13,6 +13,7 @@ distance). Movers are not in it.
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass
 
 import numba as nb
@@ -23,9 +24,10 @@ from uavexp.mapping.base import FREE, OCCUPIED, DistanceField
 from uavexp.mapping.esdf import SignedDistance, distance_table
 from uavexp.mapping.occupancy import grid_shape
 from uavexp.scene import Scene
-from uavexp.types import Float, Float32, MapUpdate, Scan, UInt8
+from uavexp.types import Float, Float32, Int, MapUpdate, Scan, UInt8
 
 _BYTES_PER_VOXEL = 80  # ESDF 19, centres, rays and distances while it is made
+_BLOCKS = (8, 4, 2)  # edges of the blocks of voxels asked first, each half the one before
 _SAME_M = 1e-4  # distances nearer than this are equal: the scene's are float32
 
 
@@ -71,6 +73,29 @@ def _sheets(crossed: UInt8, reached: UInt8, distance: Float32, same: float, stat
                         state[x, y, z] = OCCUPIED
                     if there <= here + same:
                         state[i, j, k] = OCCUPIED
+
+
+def _near_surfaces(
+    scene: Scene, origin_m: Float, voxel_m: float, shape: tuple[int, ...], reach_m: float
+) -> Int:
+    """Flat indices of all voxels whose centre may be within `reach_m` of a surface, and of few others.
+
+    Blocks of voxels are asked first, at their centre: most of the distances lie far from any surface.
+    """
+    near = np.ones([math.ceil(n / _BLOCKS[0]) for n in shape], dtype=bool)
+    for at, edge in enumerate(_BLOCKS):
+        if at:
+            near = (
+                near.repeat(2, 0).repeat(2, 1).repeat(2, 2)[tuple(slice(math.ceil(n / edge)) for n in shape)]
+            )
+        block = np.argwhere(near)
+        half_m = 0.5 * (edge - 1) * voxel_m  # from the block's centre to those of its outermost voxels
+        centres_m = origin_m + (block + 0.5) * edge * voxel_m
+        near[tuple(block.T)] = (
+            scene.fixed_distance_m(centres_m) <= reach_m + math.sqrt(3.0) * half_m + _SAME_M
+        )
+    near = near.repeat(2, 0).repeat(2, 1).repeat(2, 2)[tuple(slice(n) for n in shape)]
+    return np.flatnonzero(near)
 
 
 @dataclass(slots=True, kw_only=True)
@@ -156,11 +181,16 @@ class Known:
         return self._scene
 
     def _measured(self, scene: Scene) -> tuple[Float32, UInt8]:
-        """Distance of every voxel centre to the surfaces, m, and which steps up (bit: axis) cross one."""
-        shape = self._made.shape
+        """Distance of the voxel centres to the surfaces, m, and which steps up (bit: axis) cross one.
+
+        It is exact where a surface is within a voxel's edge, and infinite elsewhere.
+        """
+        shape, reach_m = self._made.shape, self.voxel_size_m + _SAME_M
         centres_m = self._field.voxel_centres_m(np.arange(self._made.size))
-        distance_m = scene.fixed_distance_m(centres_m).astype(np.float32)
-        near = np.flatnonzero(distance_m <= self.voxel_size_m + _SAME_M)
+        distance_m = np.full(self._made.size, np.inf, np.float32)
+        near = _near_surfaces(scene, self._field.origin_m, self.voxel_size_m, shape, reach_m)
+        distance_m[near] = scene.fixed_distance_m(centres_m[near])
+        near = near[distance_m[near] <= reach_m]
         rays = np.zeros((near.size, 6), np.float32)
         rays[:, :3] = centres_m[near]
         crossed = np.zeros(self._made.size, np.uint8)
