@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from tests.logs import make_log
 from uavexp.detection.clusters import Clusters
-from uavexp.detection.kalman import Motion, MotionFilter, filtered, raw_velocities_mps
+from uavexp.detection.kalman import Estimate, Motion, MotionFilter, estimated
 from uavexp.detection.tracker import Tracker, TrackRule, centres_m
 from uavexp.metrics.tracking_movers import match, measures, near_misses, predicted_errors_m, quality
 from uavexp.types import Contact, Float, Shape, TrialLog
@@ -31,7 +31,7 @@ def walk(velocity: tuple[float, float, float] = (1.0, -0.5, 0.2)) -> Float:
 
 
 def test_a_straight_walk_without_noise_is_followed_exactly_in_the_end() -> None:
-    position, velocity = filtered(TIMES_S, walk())
+    position, velocity = estimated(TIMES_S, walk())
     assert np.linalg.norm(position[-1] - walk()[-1]) < 1e-3
     assert np.linalg.norm(velocity[-1] - [1.0, -0.5, 0.2]) < 1e-2
 
@@ -55,8 +55,8 @@ def test_noise_is_smoothed_and_beats_the_last_two_positions() -> None:
     errors = []
     for _ in range(20):
         seen = walk() + rng.normal(0.0, 0.05, (40, 3))
-        _, believed = filtered(TIMES_S, seen)
-        raw = raw_velocities_mps(TIMES_S, seen)
+        _, believed = estimated(TIMES_S, seen)
+        _, raw = estimated(TIMES_S, seen, of=Estimate.RAW)
         errors.append([np.linalg.norm(one[10:] - [1.0, -0.5, 0.2], axis=1).mean() for one in (believed, raw)])
     filter_mps, raw_mps = np.mean(errors, axis=0)
     assert filter_mps < 0.4 * raw_mps
@@ -68,7 +68,7 @@ def test_process_noise_rises_in_a_turn_and_falls_again() -> None:
     seen = np.cumsum(corner * 0.1, axis=0)
     lag = {}
     for adaptivity in (1.0, 20.0):
-        _, velocity = filtered(TIMES_S, seen, Motion(acceleration_density=0.05, adaptivity=adaptivity))
+        _, velocity = estimated(TIMES_S, seen, Motion(acceleration_density=0.05, adaptivity=adaptivity))
         lag[adaptivity] = np.linalg.norm(velocity[25] - [-1.5, 0.0, 0.0])
     assert lag[20.0] < 0.85 * lag[1.0]
     filter_, misfit = MotionFilter(seen[0], Motion()), []
@@ -97,7 +97,7 @@ def test_what_is_not_finite_is_no_observation(bad: float) -> None:
 def test_filtering_moves_with_the_world(shift: tuple[float, float, float], gaps: set[int]) -> None:
     seen = walk() + np.sin(7.0 * TIMES_S)[:, None] * 0.05
     seen[sorted(gaps)] = np.nan
-    here, there = filtered(TIMES_S, seen), filtered(TIMES_S, seen + np.array(shift))
+    here, there = estimated(TIMES_S, seen), estimated(TIMES_S, seen + np.array(shift))
     assert np.allclose(here[0] + np.array(shift), there[0], atol=1e-9)
     assert np.allclose(here[1], there[1], atol=1e-9)
 
@@ -105,10 +105,10 @@ def test_filtering_moves_with_the_world(shift: tuple[float, float, float], gaps:
 def test_raw_velocities_bridge_gaps_by_the_last_two_that_were_seen() -> None:
     seen = walk()
     seen[5:8] = np.nan
-    raw = raw_velocities_mps(TIMES_S, seen)
-    assert np.isnan(raw[0]).all()
-    assert np.isnan(raw[5:8]).all()
-    assert np.allclose(raw[[1, 4, 8, 39]], [1.0, -0.5, 0.2])
+    position_m, raw = estimated(TIMES_S, seen, of=Estimate.RAW)
+    assert np.array_equal(raw[0], np.zeros(3))
+    assert np.allclose(raw[1:], [1.0, -0.5, 0.2])
+    assert np.allclose(position_m, walk())  # moved on while unseen
 
 
 def clusters(*boxes: tuple[tuple[float, float, float], tuple[float, float, float]]) -> Clusters:

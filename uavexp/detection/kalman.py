@@ -11,13 +11,21 @@ the misfit while it does not.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from enum import StrEnum
 from functools import lru_cache
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from uavexp.types import Float
+
+
+class Estimate(StrEnum):
+    """Where a mover's velocity comes from."""
+
+    KALMAN = "kalman"
+    RAW = "raw"  # the last two observed positions: the baseline
+
 
 _H = np.eye(3, 6)
 _UPRIGHT = 0.1  # q upwards over q level: little that moves in a building climbs or sinks all of a sudden
@@ -69,9 +77,13 @@ class MotionFilter:
     motion: Motion
     misfit: float = 1.0  # fading average of the normalised innovation squared over its expectation
     _kalman: Any = field(init=False, repr=False)
+    _seen_m: Float = field(init=False, repr=False)  # (3,) last observed
+    _raw_mps: Float = field(init=False, repr=False)  # (3,) from the last two observed
+    _unseen_s: float = field(init=False, repr=False, default=0.0)
 
     def __post_init__(self) -> None:
         self._kalman = _new_filter(self.first_m, self.motion)
+        self._seen_m, self._raw_mps = np.array(self.first_m), np.zeros(3)
 
     @property
     def position_m(self) -> Float:
@@ -93,8 +105,15 @@ class MotionFilter:
         """Of the next observation's difference from the prediction (3, 3)."""
         return np.asarray(self._kalman.P[:3, :3] + self._kalman.R)
 
+    def estimate(self, of: Estimate) -> tuple[Float, Float]:
+        """Position (3,) and velocity (3,) now, from the filter or from the last two observed positions."""
+        if of is Estimate.KALMAN:
+            return self.position_m, self.velocity_mps
+        return self._seen_m + self._unseen_s * self._raw_mps, self._raw_mps
+
     def predict(self, period_s: float) -> None:
         """Move on by a period > 0 s."""
+        self._unseen_s += period_s
         density = self.motion.acceleration_density * min(max(self.misfit, 1.0), self.motion.adaptivity)
         transition, noise = _step(round(period_s, 6))
         self._kalman.predict(F=transition, Q=density * noise)
@@ -104,6 +123,9 @@ class MotionFilter:
         if not np.isfinite(position_m).all():
             return
         self._kalman.update(position_m)
+        if self._unseen_s > 0.0:
+            self._raw_mps = (position_m - self._seen_m) / self._unseen_s
+        self._seen_m, self._unseen_s = np.array(position_m), 0.0
         innovation, inverse = self._kalman.y, self._kalman.SI
         share = 1.0 - self.motion.fading
         self.misfit += share * (float(innovation @ inverse @ innovation) / _EXPECTED - self.misfit)
@@ -121,13 +143,16 @@ class MotionFilter:
         )
 
 
-def filtered(times_s: Float, positions_m: Float, motion: Motion | None = None) -> tuple[Float, Float]:
-    """Position and velocity, each (K, 3), that the filter believes at each observation.
+def estimated(
+    times_s: Float, positions_m: Float, motion: Motion | None = None, of: Estimate = Estimate.KALMAN
+) -> tuple[Float, Float]:
+    """Position and velocity, each (K, 3), that are believed at each observation.
 
     Args:
         times_s: (K,) increasing, s.
         positions_m: (K, 3) observed; rows of NaN are missed.
         motion: what is assumed.
+        of: the filter's, or from the last two observed positions.
     """
     filter_: MotionFilter | None = None
     believed = np.full((2, len(times_s), 3), np.nan)
@@ -138,13 +163,5 @@ def filtered(times_s: Float, positions_m: Float, motion: Motion | None = None) -
         elif np.isfinite(position_m).all():
             filter_ = MotionFilter(position_m, motion or Motion())
         if filter_ is not None:
-            believed[:, k] = filter_.position_m, filter_.velocity_mps
+            believed[:, k] = filter_.estimate(of)
     return believed[0], believed[1]
-
-
-def raw_velocities_mps(times_s: Float, positions_m: Float) -> Float:
-    """Velocity (K, 3) from the last two observed positions (K, 3); NaN first. The baseline."""
-    velocity = np.full(positions_m.shape, np.nan)
-    for before, now in pairwise(np.flatnonzero(np.isfinite(positions_m).all(axis=1))):
-        velocity[now] = (positions_m[now] - positions_m[before]) / (times_s[now] - times_s[before])
-    return velocity

@@ -24,10 +24,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from uavexp.detection.clusters import cluster, split
-from uavexp.detection.kalman import Motion
+from uavexp.detection.kalman import Estimate, Motion
 from uavexp.detection.returns import free_at, returns, viewpoint_m, without
 from uavexp.detection.tracker import Tracker, TrackRule
-from uavexp.errors import require, require_non_negative, require_positive
+from uavexp.errors import require, require_non_negative, require_option, require_positive
 from uavexp.mapping.base import DistanceField
 from uavexp.types import Bodies, Bool, Float, Limits, Scan, Tracks
 
@@ -52,6 +52,7 @@ class Sensed:
     position_noise_m: float = 0.08
     acceleration_density: float = 0.1
     adaptivity: float = 20.0
+    estimate: Estimate = Estimate.KALMAN
     _tracker: Tracker | None = field(init=False, repr=False, default=None)
     _time_s: float = field(init=False, repr=False, default=np.nan)
     _before: tuple[DistanceField, DistanceField] | None = field(init=False, repr=False, default=None)
@@ -73,6 +74,7 @@ class Sensed:
         )
         require_non_negative(standing_mps=self.standing_mps, coast_s=self.coast_s)
         require(1.0 <= self.adaptivity < np.inf, f"adaptivity must be >= 1 and finite, got {self.adaptivity}")
+        self.estimate = require_option("estimate", self.estimate, Estimate)
         for name in ("min_points", "confirm_hits"):
             value = getattr(self, name)
             require(isinstance(value, int) and value >= 1, f"{name} must be a whole number >= 1, got {value}")
@@ -93,6 +95,7 @@ class Sensed:
                 acceleration_density=self.acceleration_density,
                 adaptivity=self.adaptivity,
             ),
+            estimate=self.estimate,
         )
         self._tracker, self._time_s, self._before, self._kept_s = Tracker(rule), np.nan, None, -np.inf
 

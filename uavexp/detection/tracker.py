@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uavexp.detection.clusters import Clusters
-from uavexp.detection.kalman import Motion, MotionFilter
+from uavexp.detection.kalman import Estimate, Motion, MotionFilter
 from uavexp.types import Bool, Float, Int, Tracks
 
 _NEW_MISSES = 2  # a new track that misses more in a row is forgotten
@@ -38,6 +38,7 @@ class TrackRule(NamedTuple):
     max_speed_mps: float
     max_deviation_m: float
     motion: Motion
+    estimate: Estimate = Estimate.KALMAN
 
 
 @dataclass(slots=True)
@@ -120,11 +121,14 @@ class Tracker:
         known = [track for track in self.tracks if track.confirmed]
         if not known:
             return replace(Tracks.none(time_s), dropped=self.dropped)
+        position_m, velocity_mps = zip(
+            *(track.filter.estimate(self.rule.estimate) for track in known), strict=True
+        )
         return Tracks(
             time_s=time_s,
             identity=np.array([track.identity for track in known]),
-            position_m=np.stack([track.filter.position_m for track in known]),
-            velocity_mps=np.stack([track.filter.velocity_mps for track in known]),
+            position_m=np.stack(position_m),
+            velocity_mps=np.stack(velocity_mps),
             covariance=np.stack([track.filter.covariance for track in known]),
             half_size_m=np.stack([track.half_size_m for track in known]),
             dropped=self.dropped,

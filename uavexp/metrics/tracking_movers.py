@@ -42,7 +42,7 @@ def measures(log: TrialLog, near_miss_m: float) -> dict[str, bool | int | float 
     at = zip(HORIZONS_S, tracks.prediction_error_m, strict=True)
     return {
         "mover_contacts": sum(contact.mover >= 0 for contact in log.contacts),
-        "min_mover_clearance_m": float(log.mover_clearance_m.min()),
+        "min_mover_clearance_m": _nearest_m(log),
         "near_miss_distance_m": near_miss_m,
         "near_misses": near_misses(log.time_s, log.mover_clearance_m, log.contacts, near_miss_m),
         "track_error_m": tracks.position_error_m,
@@ -52,6 +52,12 @@ def measures(log: TrialLog, near_miss_m: float) -> dict[str, bool | int | float 
         "false_track_share": tracks.false_share,
         "identity_switches": tracks.identity_switches,
     }
+
+
+def _nearest_m(log: TrialLog) -> float:
+    """Least distance to a mover; NaN when none was ever there."""
+    least_m = float(log.mover_clearance_m.min())
+    return least_m if math.isfinite(least_m) else math.nan
 
 
 def predicted_errors_m(

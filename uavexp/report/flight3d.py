@@ -12,12 +12,13 @@ from typing import Any
 
 import numpy as np
 
+from uavexp.bodies import present
 from uavexp.metrics import path, replanning, tracking
 from uavexp.report import style
 from uavexp.report.figures import flown
 from uavexp.report.figures.looks import looks_of
 from uavexp.study import Study
-from uavexp.types import Float, Replan, TrialLog, World
+from uavexp.types import Float, Int, Replan, TrialLog, World
 
 MOST_POINTS = 600  # of a path
 _ABOVE_FLIGHT_M = 0.3  # the map is cut here at first, so that one looks into the rooms
@@ -136,6 +137,22 @@ def _flight(world: World, log: TrialLog) -> Json:
         "contacts": _axes(np.array([contact.position_m for contact in log.contacts]).reshape(-1, 3)),
         "replans": [_replan(number, replan) for number, replan in enumerate(replanning.executed(log), 1)],
         "map": voxels(log.mapped_m),
+        **({"movers": _movers(log, rows[::3])} if log.mover_shape.size else {}),
+    }
+
+
+def _movers(log: TrialLog, rows: Int) -> Json:
+    """Paths of all movers one after the other, null where one is not there, and their last places."""
+    places_m = log.mover_position_m[rows].astype(np.float64)
+    there = present(places_m)
+    broken_m = np.pad(
+        np.where(there[..., None], places_m, np.nan), ((0, 1), (0, 0), (0, 0)), constant_values=np.nan
+    )
+    paths = broken_m.transpose(2, 1, 0).reshape(3, -1)
+    return {
+        "count": int(there.any(axis=0).sum()),
+        "paths": [[None if np.isnan(value) else round(float(value), 3) for value in axis] for axis in paths],
+        "last": _axes(places_m[-1, there[-1]]),
     }
 
 

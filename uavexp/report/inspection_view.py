@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
 
 from uavexp.metrics import clearance, coverage, path
-from uavexp.report import plan_view, style
+from uavexp.report import movers_view, plan_view, style
 from uavexp.types import Bool, Float, TrialLog, World
 
 if TYPE_CHECKING:
@@ -35,12 +35,11 @@ def draw(axes: Axes, world: World, log: TrialLog, view: Float) -> Normalize:
         axes.add_patch(
             Polygon(list(corners[_BASE, :2]), fc=style.ORANGE, ec=style.BLACK, lw=0.5, alpha=0.8, zorder=1)
         )
-    _draw_people(axes, log)
+    movers_view.draw(axes, log)
     _draw_cells(axes, log, view)
     _draw_viewpoints(axes, log)
     scale = plan_view.draw_path(axes, log)
-    for contact in log.contacts:
-        axes.plot(*contact.position_m[:2], "X", color=style.VERMILLION, mec=style.BLACK, ms=9.5, zorder=8)
+    plan_view.draw_contacts(axes, log)
     axes.plot(*world.start_m[:2], "o", color="white", mec=style.BLACK, mew=1.4, ms=8, zorder=6)
     plan_view.frame(axes, view)
     return scale
@@ -78,12 +77,7 @@ def handles(world: World, log: TrialLog) -> list[Line2D | Patch]:
         shown.append(
             Patch(fc=style.ORANGE, ec=style.BLACK, label=f"unforeseen block ({len(blocks_m(world))})")
         )
-    if log.mover_shape.size:
-        shown.append(Line2D([], [], color=style.PURPLE, lw=1.0, label=f"moving ({log.mover_shape.size})"))
-    if log.contacts:
-        label = f"contact ({len(log.contacts)})"
-        shown.append(Line2D([], [], color=style.VERMILLION, marker="X", ls="", ms=9, label=label))
-    return shown
+    return [*shown, *plan_view.contact_handles(log)]
 
 
 def key_numbers(log: TrialLog) -> str:
@@ -116,15 +110,6 @@ def blocks_m(world: World) -> Float:
     if world.reference is None or len(added) % 8:
         return np.zeros((0, 8, 3))
     return added.reshape(-1, 8, 3)
-
-
-def _draw_people(axes: Axes, log: TrialLog) -> None:
-    """Draw where the movers went, and their outlines at the end."""
-    stride = max(1, len(log.mover_position_m) // 1000)
-    for mover in range(log.mover_shape.size):
-        places = log.mover_position_m[::stride, mover]
-        axes.plot(places[:, 0], places[:, 1], color=style.PURPLE, lw=0.6, alpha=0.5, zorder=1.5)
-        axes.plot(*places[-1, :2], "o", color=style.PURPLE, mec=style.BLACK, mew=0.4, ms=6, zorder=5.5)
 
 
 def _draw_cells(axes: Axes, log: TrialLog, view: Float) -> None:

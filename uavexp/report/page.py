@@ -14,6 +14,7 @@ WIDTH_IN = 11.0
 LEFT_IN, RIGHT_IN, BOTTOM_IN, HEADER_IN = 0.6, 0.25, 0.5, 0.68
 PANEL_IN, PANEL_GAP_IN = 1.35, 0.16
 LEGEND_IN, AXIS_LABEL_IN = 0.62, 0.42
+LEGEND_ROW_IN = 0.16
 PLAN_HEIGHT_IN = (2.2, 6.6)  # least and greatest
 SIDE_PLAN_HEIGHT_IN, SIDE_PLAN_WIDTH_IN = 7.0, 5.6
 COLUMN_GAP_IN = 0.75
@@ -30,20 +31,30 @@ class Page:
     speed_bar: Axes
     legend_corner: tuple[float, float]  # upper left, share of the figure
     legend_columns: int
+    movers_corner: tuple[float, float]  # of the movers' own legend
+    movers_columns: int
 
 
-def lay_out(size_m: tuple[float, float]) -> Page:
-    """Return a page for a plan of this size: panels below a wide plan, beside a tall one."""
-    return _below(size_m[1] / size_m[0]) if size_m[1] <= size_m[0] else _beside(size_m[1] / size_m[0])
+def lay_out(size_m: tuple[float, float], mover_entries: int = 0) -> Page:
+    """Return a page for a plan of this size: panels below a wide plan, beside a tall one.
+
+    Args:
+        size_m: width and height of the plan.
+        mover_entries: of the movers' legend, which stands above the other one.
+    """
+    aspect = size_m[1] / size_m[0]
+    return _below(aspect, mover_entries) if aspect <= 1.0 else _beside(aspect, mover_entries)
 
 
-def _below(aspect: float) -> Page:
+def _below(aspect: float, mover_entries: int) -> Page:
     width = WIDTH_IN - LEFT_IN - RIGHT_IN
     plan = min(max(width * aspect, PLAN_HEIGHT_IN[0]), PLAN_HEIGHT_IN[1])
     tracking_y = BOTTOM_IN
     clearance_y = tracking_y + PANEL_IN + PANEL_GAP_IN
     legend_y = clearance_y + PANEL_IN + 0.3
-    plan_y = legend_y + LEGEND_IN + AXIS_LABEL_IN
+    legend_top = legend_y + LEGEND_IN
+    movers_top = legend_top + LEGEND_ROW_IN * -(-mover_entries // 5)
+    plan_y = movers_top + AXIS_LABEL_IN
     figure = Figure(figsize=(WIDTH_IN, plan_y + plan + HEADER_IN))
     bar_width = 1.7
     return _page(
@@ -52,16 +63,19 @@ def _below(aspect: float) -> Page:
         clearance=(LEFT_IN, clearance_y, width, PANEL_IN),
         tracking=(LEFT_IN, tracking_y, width, PANEL_IN),
         speed_bar=(WIDTH_IN - RIGHT_IN - bar_width, legend_y + 0.4, bar_width, 0.1),
-        legend=(LEFT_IN - 0.1, legend_y + LEGEND_IN),
+        legend=(LEFT_IN - 0.1, legend_top),
         columns=6,
+        movers_legend=(LEFT_IN - 0.1, movers_top),
+        movers_columns=5,
     )
 
 
-def _beside(aspect: float) -> Page:
+def _beside(aspect: float, mover_entries: int) -> Page:
     plan_width = min(SIDE_PLAN_HEIGHT_IN / aspect, SIDE_PLAN_WIDTH_IN)
     x = LEFT_IN + plan_width + COLUMN_GAP_IN
     width = WIDTH_IN - RIGHT_IN - x
-    panel = 2.2
+    movers = LEGEND_ROW_IN * -(-mover_entries // 2)
+    panel = 2.2 - 0.5 * movers
     clearance_y = BOTTOM_IN + panel + PANEL_GAP_IN
     figure = Figure(figsize=(WIDTH_IN, BOTTOM_IN + SIDE_PLAN_HEIGHT_IN + HEADER_IN))
     top = BOTTOM_IN + SIDE_PLAN_HEIGHT_IN
@@ -71,8 +85,10 @@ def _beside(aspect: float) -> Page:
         clearance=(x, clearance_y, width, panel),
         tracking=(x, BOTTOM_IN, width, panel),
         speed_bar=(x + 0.05, clearance_y + panel + 0.7, 1.7, 0.1),
-        legend=(x - 0.1, top - 0.05),
+        legend=(x - 0.1, top - 0.05 - movers),
         columns=2,
+        movers_legend=(x - 0.1, top - 0.05),
+        movers_columns=2,
     )
 
 
@@ -88,6 +104,8 @@ def _page(
     speed_bar: _Box,
     legend: tuple[float, float],
     columns: int,
+    movers_legend: tuple[float, float],
+    movers_columns: int,
 ) -> Page:
     width, height = figure.get_size_inches()
 
@@ -102,4 +120,6 @@ def _page(
         speed_bar=add(speed_bar),
         legend_corner=(legend[0] / width, legend[1] / height),
         legend_columns=columns,
+        movers_corner=(movers_legend[0] / width, movers_legend[1] / height),
+        movers_columns=movers_columns,
     )

@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from uavexp.metrics import replanning
-from uavexp.report import inspection_view, page, plan_view, style
+from uavexp.report import inspection_view, movers_view, page, plan_view, style
 from uavexp.types import TrialLog, World
 
 if TYPE_CHECKING:
@@ -42,19 +42,25 @@ def draw(world: World, log: TrialLog, metrics: Values, title: str, path: Path | 
     with style.house_style():
         view = plan_view.view_m(world, log)
         size_m = view[1] - view[0]
-        sheet = page.lay_out((float(size_m[0]), float(size_m[1])))
-        FigureCanvasAgg(sheet.figure)
         inspects = inspection_view.is_inspection(log)
+        near_miss_m = _number(metrics, "near_miss_distance_m")
+        movers = movers_view.handles(log, near_miss_m)
+        sheet = page.lay_out((float(size_m[0]), float(size_m[1])), len(movers))
+        FigureCanvasAgg(sheet.figure)
         draw_plan = inspection_view.draw if inspects else plan_view.draw
         speed_scale = draw_plan(sheet.plan, world, log, view)
+        movers_view.draw_near_misses(sheet.plan, log, near_miss_m)
         _draw_speed_bar(sheet.speed_bar, speed_scale)
-        _draw_clearance(sheet.clearance, log, _number(metrics, "safety_threshold_m"))
+        _draw_clearance(sheet.clearance, log, _number(metrics, "safety_threshold_m"), near_miss_m)
         if inspects:
             inspection_view.draw_coverage(sheet.tracking, log)
             _finish_panel(sheet.tracking, log, legend=False)
         else:
             _draw_tracking(sheet.tracking, log)
-        _draw_legend(sheet, inspection_view.handles(world, log) if inspects else _handles(world, log))
+        rest = inspection_view.handles(world, log) if inspects else _handles(world, log)
+        _draw_legend(sheet, rest, sheet.legend_corner, sheet.legend_columns)
+        if movers:
+            _draw_legend(sheet, movers, sheet.movers_corner, sheet.movers_columns)
         _draw_header(sheet, world, log, metrics, title)
         sheet.figure.savefig(path, dpi=DPI, format="png", metadata={"Software": None})
 
@@ -75,8 +81,8 @@ def _draw_speed_bar(axes: Axes, scale: Normalize) -> None:
     axes.xaxis.labelpad = 1.0
 
 
-def _draw_clearance(axes: Axes, log: TrialLog, safety_threshold_m: float) -> None:
-    """Draw true and mapped clearance over time, with the threshold and the contacts."""
+def _draw_clearance(axes: Axes, log: TrialLog, safety_threshold_m: float, near_miss_m: float) -> None:
+    """Draw true and mapped clearance over time, with the thresholds and the contacts."""
     stride = max(1, log.time_s.size // MOST_POINTS)
     time_s, clearance_m = log.time_s[::stride], log.clearance_m[::stride]
     axes.plot(log.tick_s, log.esdf_clearance_m, color=style.ORANGE, lw=1.0, label="in the map (ESDF)")
@@ -91,10 +97,9 @@ def _draw_clearance(axes: Axes, log: TrialLog, safety_threshold_m: float) -> Non
         )
     for contact in log.contacts:
         axes.axvspan(contact.start_s, contact.end_s, color=style.VERMILLION, alpha=0.25, lw=0)
-        axes.plot(
-            contact.start_s, 0.0, "X", color=style.VERMILLION, mec=style.BLACK, mew=0.6, ms=7, clip_on=False
-        )
+        axes.plot(contact.start_s, 0.0, clip_on=False, **style.contact_marker(contact.mover >= 0, 7.0))
     axes.set_ylim(bottom=0.0)
+    movers_view.draw_clearance(axes, log, near_miss_m)
     axes.set_ylabel("clearance [m]")
     axes.tick_params(labelbottom=False)
     _finish_panel(axes, log)
@@ -125,8 +130,9 @@ def _finish_panel(axes: Axes, log: TrialLog, *, legend: bool = True) -> None:
     if log.time_s.size < 2:
         axes.text(0.5, 0.5, "no flight", transform=axes.transAxes, ha="center", va="center", color="#606060")
     elif legend:
+        columns = 5 if axes.get_position().width > 0.6 else 3
         axes.legend(
-            loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, handlelength=1.6, borderaxespad=0.1
+            loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, handlelength=1.6, borderaxespad=0.1
         )
 
 
@@ -147,12 +153,14 @@ def _handles(world: World, log: TrialLog) -> list[Line2D | Patch]:
     ]
 
 
-def _draw_legend(sheet: page.Page, handles: list[Line2D | Patch]) -> None:
+def _draw_legend(
+    sheet: page.Page, handles: list[Line2D | Patch], corner: tuple[float, float], columns: int
+) -> None:
     sheet.figure.legend(
         handles=handles,
         loc="upper left",
-        bbox_to_anchor=sheet.legend_corner,
-        ncols=sheet.legend_columns,
+        bbox_to_anchor=corner,
+        ncols=columns,
         handlelength=1.5,
         labelspacing=0.35,
         borderaxespad=0.0,
@@ -177,14 +185,7 @@ def _event_handles(log: TrialLog) -> list[Line2D]:
             "ms": 6.5,
         }
         handles.append(Line2D([], [], label=f"hollow: no plan found ({failed})", **hollow))
-    if log.contacts:
-        label = f"contact ({len(log.contacts)})"
-        handles.append(
-            Line2D(
-                [], [], color=style.VERMILLION, marker="X", ls="", mec=style.BLACK, mew=0.7, ms=9, label=label
-            )
-        )
-    return handles
+    return [*handles, *plan_view.contact_handles(log)]
 
 
 def _draw_header(sheet: page.Page, world: World, log: TrialLog, metrics: Values, title: str) -> None:
@@ -200,7 +201,9 @@ def _draw_header(sheet: page.Page, world: World, log: TrialLog, metrics: Values,
     sheet.figure.text(left, 1.0 - 0.23 / height_in, head, fontsize=12, fontweight="bold", va="center")
     inspects = inspection_view.is_inspection(log)
     numbers = inspection_view.key_numbers(log) if inspects else _key_numbers(metrics)
-    sheet.figure.text(left, 1.0 - 0.43 / height_in, numbers, fontsize=9, va="center")
+    numbers = "    ".join((numbers, *movers_view.key_numbers(metrics)))
+    size = min(9.0, 9.0 * 140 / len(numbers))
+    sheet.figure.text(left, 1.0 - 0.43 / height_in, numbers, fontsize=size, va="center")
     command = textwrap.shorten(title, 170, placeholder=" …")
     size = min(8.0, 8.0 * 150 / max(len(command), 1))
     sheet.figure.text(

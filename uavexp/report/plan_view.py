@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.collections import LineCollection
 from matplotlib.colors import LinearSegmentedColormap, ListedColormap, Normalize
+from matplotlib.lines import Line2D
 from matplotlib.ticker import MultipleLocator
 
 from uavexp.metrics import replanning
-from uavexp.report import section, style
+from uavexp.report import movers_view, section, style
 from uavexp.types import Float, TrialLog, World
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ def draw(axes: Axes, world: World, log: TrialLog, view: Float) -> Normalize:
     for replan in log.replans:
         points = replan.trajectory_m
         axes.plot(points[:, 0], points[:, 1], color=style.SKY, lw=0.6, alpha=0.6, zorder=3)
+    movers_view.draw(axes, log)
     scale = draw_path(axes, log)
     _draw_events(axes, log)
     draw_task(axes, world)
@@ -145,10 +147,21 @@ def _draw_events(axes: Axes, log: TrialLog) -> None:
         axes.plot(*replan.position_m[:2], zorder=7, **style.failed_marker(replan.cause, size_pt))
     for replan in replanning.executed(log):
         axes.plot(*replan.position_m[:2], zorder=7.1, **style.marker(replan.cause, size_pt))
+    draw_contacts(axes, log)
+
+
+def draw_contacts(axes: Axes, log: TrialLog) -> None:
+    """Mark contacts, those with movers apart from those with what stands."""
     for contact in log.contacts:
-        axes.plot(
-            *contact.position_m[:2], "X", color=style.VERMILLION, mec=style.BLACK, mew=0.7, ms=9.5, zorder=8
-        )
+        axes.plot(*contact.position_m[:2], zorder=8, **style.contact_marker(contact.mover >= 0, 9.5))
+
+
+def contact_handles(log: TrialLog) -> list[Line2D]:
+    """The legend's entry for contacts with what stands, with their count; none without."""
+    count = sum(contact.mover < 0 for contact in log.contacts)
+    label = f"{'wall ' if log.mover_shape.size else ''}contact ({count})"
+    look = style.contact_marker(with_mover=False, size_pt=9.0)
+    return [Line2D([], [], label=label, **look)] if count else []
 
 
 def marker_size_pt(log: TrialLog) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from uavexp.metrics.tracking_movers import HORIZONS_S, MEAN_HORIZONS_S, WITHIN_M
 from uavexp.report.comparison import SUCCESS, Metric
 
 RATE = Metric(column=SUCCESS, label="Success rate, SR [%]", digits=1, better=1, scale=100.0)
@@ -70,6 +71,7 @@ CAUSES = {
         "covered",
         "expired",
         "arrival",
+        "risk",
         "other",
     )
 }
@@ -110,6 +112,17 @@ PLANS = (
     Metric(column="plan_min_clearance_m", label="Least true clearance of the plan [m]", digits=2, better=1),
     Metric(column="plan_length_m", label="Length of the plan [m]", digits=2, better=-1),
     Metric(column="plan_path_length_m", label="Length of the searched path [m]", digits=2, better=-1),
+    Metric(column="plan_path_height_reversals", label="Reversals of height", digits=2, better=-1),
+    Metric(
+        column="plan_path_excess_climb_m", label="Height gained and lost for nothing [m]", digits=2, better=-1
+    ),
+    Metric(column="plan_path_heading_change_deg", label="Heading change, summed [°]", digits=0, better=-1),
+    Metric(
+        column="plan_path_mean_heading_change_deg",
+        label="Heading change, mean of turns [°]",
+        digits=1,
+        better=-1,
+    ),
     Metric(column="plan_duration_s", label="Duration of the plan [s]", digits=2, better=-1),
     Metric(column="plan_iterations", label="Iterations", digits=0),
     Metric(column="plan_collision_checks", label="Collision checks", digits=0, better=-1),
@@ -117,4 +130,54 @@ PLANS = (
     Metric(column="wall_optimise_sum_s", label="Smoothing time [ms]", digits=1, better=-1, scale=1e3),
 )
 
-BY_COLUMN = {metric.column: metric for metric in (*TABLE_1, *FURTHER, *PLANS)}
+# of flights among movers
+MOVERS = (
+    Metric(column="mover_contacts", label="Contacts with movers", digits=2, better=-1, is_count=True),
+    Metric(column="near_misses", label="Near misses of movers", digits=2, better=-1, is_count=True),
+    Metric(column="min_mover_clearance_m", label="Min. distance to a mover [m]", digits=2, better=1),
+    Metric(column="track_error_m", label="Position error of tracks [m]", digits=3, better=-1),
+    *(
+        Metric(
+            column=f"prediction_error_{ahead_s:g}s_m",
+            label=f"Prediction error after {ahead_s:g} s [m]",
+            digits=3,
+            better=-1,
+        )
+        for ahead_s in HORIZONS_S
+    ),
+    Metric(
+        column="prediction_error_mean_m",
+        label=f"Prediction error, mean over {MEAN_HORIZONS_S[-1]:g} s [m]",
+        digits=3,
+        better=-1,
+    ),
+    Metric(
+        column="missed_track_share",
+        label=f"Movers within {WITHIN_M:g} m not tracked [%]",
+        digits=1,
+        better=-1,
+        scale=100.0,
+    ),
+    Metric(column="false_track_share", label="False tracks [%]", digits=1, better=-1, scale=100.0),
+    Metric(column="identity_switches", label="Identity switches", digits=2, better=-1, is_count=True),
+)
+
+# of inspections
+INSPECTION = (
+    Metric(column="coverage_visible", label="Coverage of the visible [%]", digits=2, better=1, scale=100.0),
+    Metric(column="coverage", label="Coverage of all targets [%]", digits=2, better=1, scale=100.0),
+    Metric(column="viewpoints", label="Viewpoints", digits=1, is_count=True),
+    Metric(column="unreachable", label="Viewpoints not reached", digits=2, better=-1, is_count=True),
+    Metric(column="tour_length_m", label="Tour as planned, straight [m]", digits=1, better=-1),
+    Metric(column="segment_switches", label="Segment switches", digits=1, better=-1, is_count=True),
+    Metric(
+        column="wall_explore_median_s", label="Choice of view, median [ms]", digits=1, better=-1, scale=1e3
+    ),
+    Metric(column="wall_explore_p99_s", label="Choice of view, 99 % [ms]", digits=1, better=-1, scale=1e3),
+    Metric(
+        column="wall_optimise_median_s", label="Optimisation, median [ms]", digits=1, better=-1, scale=1e3
+    ),
+    Metric(column="wall_optimise_p99_s", label="Optimisation, 99 % [ms]", digits=1, better=-1, scale=1e3),
+)
+
+BY_COLUMN = {metric.column: metric for metric in (*TABLE_1, *FURTHER, *MOVERS, *PLANS, *INSPECTION)}

@@ -18,6 +18,7 @@ YELLOW = "#F0E442"
 BLUE = "#0072B2"
 VERMILLION = "#D55E00"
 PURPLE = "#CC79A7"
+WINE = "#882255"  # Tol 2021; movers as predicted, beside purple ones as they were
 
 SURFACE = "#B4B4B4"  # true obstacles' surfaces
 SOLID = "#E8E8E8"  # inside them, or shut off from the flight
@@ -43,6 +44,7 @@ CAUSE_MARKS = {
     "expired": Mark(YELLOW, "h"),
     "arrival": Mark("#8C6D31", "<"),
     "brake": Mark(BLACK, "v"),
+    "risk": Mark(WINE, ">"),
 }
 OTHER_MARK = Mark("#606060", "P")
 
@@ -64,6 +66,17 @@ def failed_marker(cause: str, size_pt: float) -> dict[str, Any]:
     look = cause_mark(cause)
     hollow = {"color": look.colour, "mfc": "white", "mew": 1.2}
     return {"marker": look.marker, "ls": "", "ms": 0.8 * size_pt, **hollow}
+
+
+def contact_marker(with_mover: bool, size_pt: float) -> dict[str, Any]:
+    """Line2D settings of a contact: a cross with what stands, a burst with what moves."""
+    fill = {"color": VERMILLION, "mec": BLACK, "mew": 0.7}
+    return {
+        "marker": (8, 1, 0) if with_mover else "X",
+        "ls": "",
+        "ms": size_pt * (1.4 if with_mover else 1.0),
+        **fill,
+    }
 
 
 _SETTINGS: dict[str, object] = {

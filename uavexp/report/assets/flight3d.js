@@ -77,6 +77,16 @@
     });
   }
 
+  function moverTraces(movers) {
+    if (!movers) return [];
+    const mark = { color: "#cc79a7", symbol: "circle", size: 6, line: { color: "#000", width: 1 } };
+    return [
+      { ...along(movers.paths), mode: "lines", name: `movers (${movers.count})`, hoverinfo: "name",
+        line: { color: "#cc79a7", width: 3 } },
+      { ...along(movers.last), mode: "markers", name: "movers at the end", hoverinfo: "name", marker: mark },
+    ];
+  }
+
   function traces(flight) {
     const cut = Number(slider.value);
     const mesh = surface(flight.map, cut);
@@ -91,6 +101,7 @@
         line: { color: "#000000", width: 3, dash: "dash" } },
       { ...along(flight.flown), mode: "lines", name: "flown", hoverinfo: "text", text: flight.hover,
         line: { color: flight.colour, width: 7 } },
+      ...moverTraces(flight.movers),
       ...replanTraces(flight.replans),
       { ...along(flight.contacts), mode: "markers", name: `contact (${flight.contacts[0].length})`,
         hoverinfo: "name", marker: { color: "#d55e00", symbol: "x", size: 7 } },

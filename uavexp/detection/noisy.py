@@ -1,0 +1,86 @@
+"""Detection that sees every mover's centre up to noise: what filtering and prediction are worth alone.
+
+No mover is hidden or mistaken for another; the noise is Gaussian and drawn anew for each scan. One
+filter each, as in `sensed`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from uavexp.bodies import distance_m, present
+from uavexp.detection.kalman import Estimate, Motion, MotionFilter
+from uavexp.detection.returns import returns, without
+from uavexp.errors import require, require_non_negative, require_option, require_positive
+from uavexp.mapping.base import DistanceField
+from uavexp.types import Bodies, Int, Limits, Scan, Tracks
+
+
+@dataclass(slots=True, kw_only=True)
+class Noisy:
+    """Every body is seen, its centre with noise; returns within `margin_m` of one are its own."""
+
+    margin_m: float = 0.1
+    position_noise_m: float = 0.08
+    acceleration_density: float = 0.1
+    adaptivity: float = 20.0
+    estimate: Estimate = Estimate.KALMAN
+    _rng: np.random.Generator | None = field(init=False, repr=False, default=None)
+    _filters: dict[int, MotionFilter] = field(init=False, repr=False, default_factory=dict)
+    _time_s: float = field(init=False, repr=False, default=np.nan)
+
+    def __post_init__(self) -> None:
+        require_non_negative(margin_m=self.margin_m)
+        require_positive(
+            position_noise_m=self.position_noise_m, acceleration_density=self.acceleration_density
+        )
+        require(1.0 <= self.adaptivity < np.inf, f"adaptivity must be >= 1 and finite, got {self.adaptivity}")
+        self.estimate = require_option("estimate", self.estimate, Estimate)
+
+    def reset(self, limits: Limits, rng: np.random.Generator) -> None:
+        """Begin a trial; draws nothing yet."""
+        self._rng, self._filters, self._time_s = rng, {}, np.nan
+
+    def detect(self, scan: Scan, field: DistanceField, truth: Bodies) -> tuple[Scan, Tracks]:
+        """Return the scan without the returns of bodies, and a track of each that is there."""
+        there = np.flatnonzero(present(truth.position_m))
+        self._observe(scan.time_s, truth, there)
+        filters = [self._filters[int(body)] for body in there]
+        if not filters:
+            return scan, Tracks.none(scan.time_s)
+        position_m, velocity_mps = zip(*(one.estimate(self.estimate) for one in filters), strict=True)
+        tracks = Tracks(
+            time_s=scan.time_s,
+            identity=there,
+            position_m=np.stack(position_m),
+            velocity_mps=np.stack(velocity_mps),
+            covariance=np.stack([one.covariance for one in filters]),
+            half_size_m=truth.half_size_m[there],
+        )
+        seen = returns(scan)
+        return without(scan, seen.where[distance_m(truth, seen.points_m) <= self.margin_m]), tracks
+
+    def _observe(self, time_s: float, truth: Bodies, there: Int) -> None:
+        """Filter the bodies that are there on; forget those that are not."""
+        if self._rng is None:
+            raise RuntimeError("reset() must come first")
+        noise_m = self._rng.normal(0.0, self.position_noise_m, truth.position_m.shape)
+        motion = Motion(
+            position_noise_m=self.position_noise_m,
+            height_noise_m=self.position_noise_m,
+            acceleration_density=self.acceleration_density,
+            adaptivity=self.adaptivity,
+        )
+        known, self._filters = self._filters, {}
+        for body in map(int, there):
+            seen_m = truth.position_m[body] + noise_m[body]
+            filter_ = known.get(body)
+            if filter_ is None:
+                filter_ = MotionFilter(seen_m, motion)
+            elif time_s > self._time_s:
+                filter_.predict(time_s - self._time_s)
+                filter_.observe(seen_m)
+            self._filters[body] = filter_
+        self._time_s = time_s
