@@ -97,6 +97,17 @@ def test_cost_falls_over_iterations_and_over_time(tmp_path: Path) -> None:
     assert list(timed.get_xdata()) == [5.0, 50.0, 500.0]  # 0.5 ms an iteration
 
 
+def test_a_claim_about_an_arm_that_was_not_flown_is_not_testable(tmp_path: Path) -> None:
+    part = made_up(
+        tmp_path / "study",
+        trials().query("arm == 'old'"),
+        {"arm": ("old",), "scene": SCENES},
+        report="arms",
+        settings={"primary": "new", "metrics": ["plan_length_m"], "claims": CLAIMS},
+    )
+    assert {claim.verdict for claim in findings(part).claims} == {Verdict.NOT_TESTABLE}
+
+
 @pytest.mark.parametrize(
     ("settings", "says"),
     [

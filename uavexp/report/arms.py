@@ -50,6 +50,7 @@ def findings(study: Study) -> Findings:
     primary = str(study.settings.get("primary", panel.arms[0]))
     others = [(primary, arm) for arm in panel.arms if arm != primary] if primary in panel.arms else []
     asked = [(claim["first"], claim["second"]) for claim in _claims(study) if "second" in claim]
+    asked = [pair for pair in asked if set(pair) <= set(panel.arms)]  # a part of the arms may be flown
     tests = paired_tests(panel, metrics, list(dict.fromkeys([*others, *asked])))
     return Findings(
         tables=(

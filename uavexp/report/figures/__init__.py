@@ -15,6 +15,7 @@ from uavexp.report.figures import (
     attribution,
     convergence,
     flown,
+    inspected,
     over_time,
     paths,
     policies,
@@ -151,6 +152,8 @@ def _arms(study: Study) -> Figures:
     looks, note = looks_of(study, panel.arms), _note(study, panel)
     yield "metrics", lambda: metric_panels(panel, metrics, read_reference(study.name), looks, note)
     yield "convergence", lambda: convergence.convergence(study, panel.arms, looks, note)
+    yield "plans", lambda: inspected.plans(study, note)
+    yield "coverage_over_time", lambda: inspected.over_time(study, panel.arms, looks, note)
 
 
 _KINDS: dict[str, Callable[[Study], Figures]] = {
