@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.logs import make_log
+from uavexp.bodies import ABSENT_M
 from uavexp.detection.clusters import Clusters
 from uavexp.detection.kalman import Estimate, Motion, MotionFilter, estimated
 from uavexp.detection.tracker import Tracker, TrackRule, centres_m
@@ -242,6 +243,17 @@ def test_a_perfect_track_has_no_error_and_a_shifted_one_its_shift() -> None:
     assert slow.mean_prediction_error_m == pytest.approx(
         np.mean([np.hypot(0.3, 0.1 * n) for n in range(1, 13)]), abs=1e-5
     )
+
+
+def test_nobody_is_predicted_to_where_he_is_not() -> None:
+    """A mover that leaves and comes back: the error of a perfect track stays zero."""
+    log = log_with([(3, np.zeros(3), AHEAD)])
+    away = log.mover_position_m.copy()
+    middle = len(away) // 2
+    away[middle : middle + 20] = ABSENT_M
+    left = quality(replace(log, mover_position_m=away))
+    assert max(left.prediction_error_m) < 1e-6
+    assert left.mean_prediction_error_m < 1e-6
 
 
 def test_missed_false_and_switched_tracks_are_counted() -> None:

@@ -68,7 +68,7 @@ def predicted_errors_m(
     truth_m: Float,
     ahead_s: Sequence[float],
 ) -> Float:
-    """Distances (H,) of constant-velocity predictions from the true positions; NaN after the last one.
+    """Distances (H,) of constant-velocity predictions from the truth; NaN after its last row and where it is.
 
     Args:
         now_s: when the prediction is made.
@@ -119,6 +119,8 @@ def quality(log: TrialLog, *, gate_m: float = GATE_M, within_m: float = WITHIN_M
         within_m: only movers so near to the vehicle can be missed.
     """
     ends = np.cumsum(log.track_count)
+    truth_m = log.mover_position_m.astype(np.float64)
+    truth_m[truth_m[:, :, 2] <= _ABSENT_M] = np.nan  # whoever is not there cannot be predicted
     previous: dict[int, int] = {}
     apart: list[float] = []
     ahead: list[Float] = []
@@ -140,13 +142,12 @@ def quality(log: TrialLog, *, gate_m: float = GATE_M, within_m: float = WITHIN_M
             switches += previous.get(mover, int(identity[n])) != identity[n]
             previous[mover] = int(identity[n])
             apart.append(float(apart_m[mover, n]))
-            if log.mover_position_m[-1, mover, 2] > _ABSENT_M:
-                ahead.append(
-                    predicted_errors_m(
-                        now_s, log.track_position_m[mine][n], log.track_velocity_mps[mine][n], log.time_s,
-                        log.mover_position_m[:, mover].astype(np.float64), (*HORIZONS_S, *MEAN_HORIZONS_S),
-                    )
-                )  # fmt: skip
+            ahead.append(
+                predicted_errors_m(
+                    now_s, log.track_position_m[mine][n], log.track_velocity_mps[mine][n], log.time_s,
+                    truth_m[:, mover], (*HORIZONS_S, *MEAN_HORIZONS_S),
+                )
+            )  # fmt: skip
     errors_m = np.array(ahead).reshape(-1, len(HORIZONS_S) + len(MEAN_HORIZONS_S))
     full_m = errors_m[np.isfinite(errors_m).all(axis=1)]
     tracks = int(log.track_count.sum())
