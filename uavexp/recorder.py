@@ -179,6 +179,7 @@ def _plan_fields(plan: PlanResult | None) -> dict[str, Any]:
         "plan_breaks_s": plan.trajectory.breaks_s,
         "plan_coefficients": plan.trajectory.coefficients,
         "plan_history": plan.history,
+        "plan_tree_m": plan.tree_m.astype(np.float32),
         "plan_collision_checks": plan.collision_checks,
     }
 

@@ -319,6 +319,7 @@ class PlanResult:
     expansions: int = 0  # of the graph search
     collision_checks: int = 0  # of sampling planners
     history: Float = field(default_factory=lambda: np.zeros((0, 2)))  # (K, 2) iteration, best cost so far
+    tree_m: Float = field(default_factory=lambda: np.zeros((0, 2, 3)))  # (E, 2, 3) edges of a search's tree
     wall_search_s: float = 0.0
     wall_optimise_s: float = 0.0
 
@@ -499,6 +500,9 @@ class TrialLog:
     plan_breaks_s: Float = field(default_factory=lambda: np.zeros(0))  # (K+1,); empty without a plan
     plan_coefficients: Float = field(default_factory=lambda: np.zeros((0, 0, 3)))  # (K, D+1, 3)
     plan_history: Float = field(default_factory=lambda: np.zeros((0, 2)))  # (H, 2)
+    plan_tree_m: Float32 = field(
+        default_factory=lambda: np.zeros((0, 2, 3), dtype=np.float32)
+    )  # (E, 2, 3) edges of the search's tree
     plan_collision_checks: int = 0
     max_speed_mps: float = math.nan  # the limits that plans have to keep
     max_acceleration_mps2: float = math.nan

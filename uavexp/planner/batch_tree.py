@@ -65,7 +65,7 @@ class Found(NamedTuple):
     iterations: int
     checks: int  # looks at the map
     samples: int  # drawn and free
-    edges: Float  # (E, 2, 3) of the tree at the end, for pictures
+    edges: Float  # (E, 2, 3) of the tree at the end
 
 
 @nb.njit(cache=True)

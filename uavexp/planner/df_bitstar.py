@@ -187,7 +187,7 @@ class DfBitstar:
 
 
 def _way(found: Found, path: Float, times: Float | None, reason: str) -> FoundWay:
-    return FoundWay(path, times, found.history, found.iterations, found.checks, reason)
+    return FoundWay(path, times, found.history, found.iterations, found.checks, reason, tree=found.edges)
 
 
 def _stopped(start: Float, limits: Limits) -> Float:

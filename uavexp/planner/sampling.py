@@ -52,6 +52,7 @@ class FoundWay(NamedTuple):
     checks: int
     reason: str = ""
     pieces: tuple[Float, Float] | None = None  # breaks and coefficients of a motion to be taken as it is
+    tree: Float = np.zeros((0, 2, 3))  # (E, 2, 3) edges of the search's tree
 
 
 def space_of(request: PlanRequest, min_clearance_m: float, z_band_m: float, known_only: bool) -> FreeSpace:
@@ -119,6 +120,7 @@ def finish(
         expansions=found.iterations,
         collision_checks=found.checks,
         history=found.history,
+        tree_m=found.tree,
         wall_search_s=searched_s - began_s,
     )
     if len(found.path) == 0:

@@ -18,6 +18,7 @@ from uavexp.report.figures import (
     inspected,
     over_time,
     paths,
+    plans,
     policies,
     replans,
     robustness,
@@ -152,8 +153,18 @@ def _arms(study: Study) -> Figures:
     looks, note = looks_of(study, panel.arms), _note(study, panel)
     yield "metrics", lambda: metric_panels(panel, metrics, read_reference(study.name), looks, note)
     yield "convergence", lambda: convergence.convergence(study, panel.arms, looks, note)
+    if any(metric.column.startswith("plan_") for metric in metrics):
+        yield "first_plans", lambda: _first_plans(study, panel.arms)
     yield "plans", lambda: inspected.plans(study, note)
     yield "coverage_over_time", lambda: inspected.over_time(study, panel.arms, looks, note)
+
+
+def _first_plans(study: Study, arms: tuple[str, ...]) -> Drawing | None:
+    """The plans of all arms in the first world that all left a log of; None where none did."""
+    flights = flown.flights_of(study)
+    scenes = flown.scenes_of(study, flights)
+    shared = next(flown.shared_worlds(study, flown.stored(study, flights), arms, scenes), None)
+    return None if shared is None else plans.first_plans(shared, looks_of(study, arms))
 
 
 _KINDS: dict[str, Callable[[Study], Figures]] = {

@@ -13,7 +13,7 @@ from uavexp.report.figures import canvas, flown
 from uavexp.report.figures.looks import Look
 from uavexp.report.parts import Drawing
 from uavexp.study import Study
-from uavexp.types import Float
+from uavexp.types import Float, TrialLog, World
 
 KIND = "scene_kind"  # column: what the reference does not show
 _LEGEND_IN, _TITLE_IN = 0.8, 0.4
@@ -25,13 +25,9 @@ def plans(study: Study, note: str) -> Drawing | None:
 
     None where nothing was inspected.
     """
-    chosen = _chosen(study)
-    if not len(chosen):
+    flights = _chosen(study)
+    if not flights:
         return None
-    flights = [
-        (study.world(row.world_digest), study.log(row.trial), f"{row.arm}, seed {row.seed}")
-        for row in chosen.itertuples()
-    ]
     views = [plan_view.view_m(world, log) for world, log, _ in flights]
     width_m, depth_m = np.max([view[1] - view[0] for view in views], axis=0)
     plan_in = canvas.PAGE_IN / len(flights) * depth_m / width_m
@@ -49,7 +45,8 @@ def plans(study: Study, note: str) -> Drawing | None:
 
 _PLANS = (
     "Floor plan, flown path and cells of the surface from above, one flight left and one right (the "
-    "first and the last arm, lowest seed with a stored log). Counts in the legend are those of the flight on the right."
+    "first and the last arm, lowest seed with a stored log). Counts in the legend are of the flight on the "
+    "right."
 )
 
 
@@ -94,20 +91,13 @@ def _inspections(study: Study) -> pd.DataFrame:
     return there[there[KIND].fillna("").astype(str) != ""]
 
 
-def _chosen(study: Study) -> pd.DataFrame:
-    """Of the first and the last arm the flight with the lowest seed: arm, seed, trial, world_digest."""
+def _chosen(study: Study) -> list[tuple[World, TrialLog, str]]:
+    """Of the first and the last arm the flight with the lowest seed: its world, its log, its name."""
     there = _inspections(study)
     arms = [arm for arm in flown.arms_of(study) if arm in set(there[flown.ARM])] if len(there) else []
-    ends = list(dict.fromkeys([*arms[:1], *arms[-1:]]))
-    rows = [there[there[flown.ARM] == arm].sort_values("seed").iloc[0] for arm in ends]
-    return pd.DataFrame(
-        [
-            {
-                "arm": row[flown.ARM],
-                "seed": row["seed"],
-                "trial": row["trial"],
-                "world_digest": row["world_digest"],
-            }
-            for row in rows
-        ]
-    )
+    chosen = []
+    for arm in dict.fromkeys([*arms[:1], *arms[-1:]]):
+        row = there[there[flown.ARM] == arm].sort_values("seed").iloc[0]
+        world, log = study.world(str(row["world_digest"])), study.log(str(row["trial"]))
+        chosen.append((world, log, f"{arm}, seed {row['seed']}"))
+    return chosen
