@@ -157,6 +157,38 @@ def test_a_plan_keeps_its_margin_from_movers_at_their_own_times(found: Tracks, v
     assert np.allclose(speed[0], velocity, atol=1e-6)
 
 
+TIMELESS = ("bspline_qp", "df_bitstar", "bitstar", "rrtstar")
+
+
+def plan_by(option: str, asked: PlanRequest, **parameters: Any) -> PlanResult:
+    if option in ("bitstar", "rrtstar"):
+        pytest.importorskip("ompl")
+        parameters["max_iterations"] = 500
+    planner = build("planner", option, unknown="optimistic", **parameters)
+    planner.reset(LIMITS, np.random.default_rng(0))
+    return planner.plan(asked)
+
+
+@pytest.mark.parametrize("option", TIMELESS)
+@pytest.mark.parametrize("found", [CROSSING, OPPOSING], ids=["crossing", "opposing"])
+def test_planners_that_know_no_time_keep_the_margin_too(option: str, found: Tracks) -> None:
+    asked = request(found, velocity=(1.5, 0.0, 0.0))
+    blind, result = plan_by(option, asked, mover_horizon_s=0.0), plan_by(option, asked)
+    assert result.status is PlanStatus.OK
+    assert least_gap_m(blind, found) < 0.5 - 0.02, "without looking it would have come too near"
+    assert least_gap_m(result, found) >= 0.5 - 0.02 or result.reason.endswith("first")
+    assert least_gap_m(result, found) > 0.1
+    position = evaluate(result.trajectory, np.array([NOW_S, result.trajectory.end_s]))[0]
+    assert np.allclose(position, [[1.0, 4.0, 1.2], [12.0, 4.0, 1.2]], atol=1e-6)
+
+
+@pytest.mark.parametrize("option", TIMELESS)
+def test_movers_far_away_change_nothing(option: str) -> None:
+    far = tracks(((12.0, 1.0, 0.9), (0.0, 0.0, 0.0), PERSON))
+    alone, with_them = plan_by(option, request(tracks())), plan_by(option, request(far))
+    assert np.array_equal(alone.trajectory.coefficients, with_them.trajectory.coefficients)
+
+
 def test_a_mover_that_is_gone_when_the_vehicle_comes_is_no_obstacle() -> None:
     """It stands on the straight line now and leaves at 1.5 m/s: the plan hardly bends."""
     leaving = tracks(((3.5, 4.0, 0.9), (0.0, 1.5, 0.0), PERSON))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from uavexp.errors import require_non_negative, require_option, require_positive
+from uavexp.planner.among import plan_among
 from uavexp.planner.ompl_process import Query, require_ompl, search_with_ompl
 from uavexp.planner.sampling import (
     FoundWay,
@@ -32,6 +33,8 @@ class Bitstar:
     batch_samples: int = 100
     rewire_factor: float = 1.1
     max_iterations: int = 20_000
+    mover_margin_m: float = 0.5
+    mover_horizon_s: float = 2.0
     smoothing: Smoothing = Smoothing.BSPLINE_QP
     derivative: str = "acceleration"
     _limits: Limits | None = field(default=None, init=False, repr=False)
@@ -40,7 +43,9 @@ class Bitstar:
 
     def __post_init__(self) -> None:
         require_positive(min_clearance_m=self.min_clearance_m, rewire_factor=self.rewire_factor)
-        require_non_negative(z_band_m=self.z_band_m)
+        require_non_negative(
+            mover_margin_m=self.mover_margin_m, mover_horizon_s=self.mover_horizon_s, z_band_m=self.z_band_m
+        )
         require_whole(batch_samples=self.batch_samples, max_iterations=self.max_iterations)
         require_known_or_not(self.unknown)
         self.smoothing = require_option("smoothing", self.smoothing, Smoothing)
@@ -58,8 +63,22 @@ class Bitstar:
 
     def plan(self, request: PlanRequest) -> PlanResult:
         """Return a trajectory or the reason why there is none (`Planner.plan`)."""
-        if self._limits is None or self._smoother is None:
+        if self._limits is None:
             raise RuntimeError("plan() needs reset() first")
+        return plan_among(
+            request,
+            self._plan,
+            self._limits,
+            margin_m=self.mover_margin_m,
+            horizon_s=self.mover_horizon_s,
+            min_clearance_m=self.min_clearance_m,
+            known_only=self.unknown == "conservative",
+        )
+
+    def _plan(self, request: PlanRequest) -> PlanResult:
+        """Plan in the map as it is."""
+        assert self._limits is not None
+        assert self._smoother is not None
         began_s = time.perf_counter()
         known_only = self.unknown == "conservative"
         refused = refusal(request, self._limits, self.min_clearance_m, known_only)

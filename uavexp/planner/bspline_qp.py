@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from uavexp.errors import require, require_non_negative, require_option, require_positive
+from uavexp.planner.among import plan_among
 from uavexp.planner.search import PathSearch
 from uavexp.planner.smoothing.bspline_qp import BsplineSmoother, Derivative
 from uavexp.types import Limits, PlanRequest, PlanResult, PlanStatus
@@ -26,6 +27,8 @@ class BsplineQp:
     z_band_m: float = 0.3
     unknown: str = "optimistic"
     max_expansions: int = 300_000
+    mover_margin_m: float = 0.5
+    mover_horizon_s: float = 2.0
     derivative: Derivative = Derivative.ACCELERATION
     span_s: float = 0.3
     duration_margin: float = 1.05
@@ -36,7 +39,12 @@ class BsplineQp:
 
     def __post_init__(self) -> None:
         require_positive(min_clearance_m=self.min_clearance_m, safe_clearance_m=self.safe_clearance_m)
-        require_non_negative(path_clearance_weight=self.path_clearance_weight, z_band_m=self.z_band_m)
+        require_non_negative(
+            mover_margin_m=self.mover_margin_m,
+            mover_horizon_s=self.mover_horizon_s,
+            path_clearance_weight=self.path_clearance_weight,
+            z_band_m=self.z_band_m,
+        )
         require(
             self.safe_clearance_m > self.min_clearance_m,
             f"safe_clearance_m must be > min_clearance_m {self.min_clearance_m}, got {self.safe_clearance_m}",
@@ -72,8 +80,23 @@ class BsplineQp:
 
     def plan(self, request: PlanRequest) -> PlanResult:
         """Return a trajectory or the reason why there is none (`Planner.plan`)."""
-        if self._limits is None or self._search is None or self._smoother is None:
+        if self._limits is None:
             raise RuntimeError("plan() needs reset() first")
+        return plan_among(
+            request,
+            self._plan,
+            self._limits,
+            margin_m=self.mover_margin_m,
+            horizon_s=self.mover_horizon_s,
+            min_clearance_m=self.min_clearance_m,
+            known_only=self.unknown == "conservative",
+        )
+
+    def _plan(self, request: PlanRequest) -> PlanResult:
+        """Plan in the map as it is."""
+        assert self._limits is not None
+        assert self._search is not None
+        assert self._smoother is not None
         began = time.perf_counter()
         goal_m = request.goal.position_m
         found = self._search.find(request.field, request.position_m, goal_m, request.flight_bounds_m)

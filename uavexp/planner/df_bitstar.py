@@ -33,6 +33,7 @@ from enum import StrEnum
 import numpy as np
 
 from uavexp.errors import require, require_non_negative, require_option, require_positive
+from uavexp.planner.among import plan_among
 from uavexp.planner.batch_tree import Budget, Found, search
 from uavexp.planner.edges import Rule
 from uavexp.planner.free_space import FreeSpace, for_motions, straight_is_free
@@ -77,6 +78,8 @@ class DfBitstar:
     local_share: float = 0.5
     local_spread_m: float = 0.3
     rewire_factor: float = 1.1
+    mover_margin_m: float = 0.5
+    mover_horizon_s: float = 2.0
     smoothing: Smoothing = Smoothing.BSPLINE_QP
     derivative: str = "acceleration"
     _limits: Limits | None = field(default=None, init=False, repr=False)
@@ -91,7 +94,11 @@ class DfBitstar:
             rewire_factor=self.rewire_factor,
         )
         require_non_negative(
-            z_band_m=self.z_band_m, corner_speed_mps=self.corner_speed_mps, local_share=self.local_share
+            mover_margin_m=self.mover_margin_m,
+            mover_horizon_s=self.mover_horizon_s,
+            z_band_m=self.z_band_m,
+            corner_speed_mps=self.corner_speed_mps,
+            local_share=self.local_share,
         )
         require(self.local_share < 1.0, f"local_share must be in [0, 1), got {self.local_share}")
         require_whole(
@@ -113,8 +120,22 @@ class DfBitstar:
 
     def plan(self, request: PlanRequest) -> PlanResult:
         """Return a trajectory or the reason why there is none (`Planner.plan`)."""
-        if self._limits is None or self._smoother is None:
+        if self._limits is None:
             raise RuntimeError("plan() needs reset() first")
+        return plan_among(
+            request,
+            self._plan,
+            self._limits,
+            margin_m=self.mover_margin_m,
+            horizon_s=self.mover_horizon_s,
+            min_clearance_m=self.min_clearance_m,
+            known_only=self.unknown == "conservative",
+        )
+
+    def _plan(self, request: PlanRequest) -> PlanResult:
+        """Plan in the map as it is."""
+        assert self._limits is not None
+        assert self._smoother is not None
         began_s = time.perf_counter()
         known_only = self.unknown == "conservative"
         refused = refusal(request, self._limits, self.min_clearance_m, known_only)

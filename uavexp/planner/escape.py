@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from uavexp.geometry import evaluate
 from uavexp.planner.brake import braking_trajectory
-from uavexp.planner.optimise import Settings, fixed_shortfall, moving_obstacles
+from uavexp.planner.moving import MovingObstacles
 from uavexp.planner.spline import join
-from uavexp.types import Limits, PlanRequest, Trajectory
+from uavexp.types import Float, Limits, PlanRequest, Trajectory
 
 _DIRECTIONS = 8  # level ones that are tried
 _ASIDE_MPS = 1.2  # speed of a side step; half of it is tried as well
@@ -18,24 +19,26 @@ _WAIT_S = 0.5  # held after it: time for movers to pass
 _CHECK_S = 0.05
 
 
-def safest_stop(request: PlanRequest, settings: Settings, limits: Limits) -> tuple[Trajectory, bool]:
+def safest_stop(
+    request: PlanRequest, moving: MovingObstacles, blocked: Callable[[Float], str], limits: Limits
+) -> tuple[Trajectory, bool]:
     """The way to come to rest that stays farthest from the movers, and whether it steps aside.
 
     Braking when that keeps the margin; movers do not look out, so where it does not, the side
     step with the largest clearance over the prediction horizon, the wait at its end included.
 
     Args:
-        request: where and how fast the vehicle is, and the movers.
-        settings: margins, and the limits of what is fixed.
+        request: where and how fast the vehicle is.
+        moving: the movers.
+        blocked: says where a curve through points (P, 3) meets what is fixed; "" where it does not.
         limits: of the vehicle.
     """
-    moving = moving_obstacles(request, settings)
-    times_s = request.time_s + np.arange(0.0, settings.mover_horizon, _CHECK_S)
+    times_s = request.time_s + np.arange(0.0, moving.horizon_s, _CHECK_S)
     ways = stops(request, limits)
     best, best_m = 0, -np.inf
     for index, way in enumerate(ways):
         points_m = evaluate(way, times_s)[0]
-        if fixed_shortfall(request, settings, points_m):
+        if blocked(points_m):
             continue
         clearance_m = float(moving.clearance_m(points_m, times_s).min())
         if index == 0 and clearance_m >= 0.0:

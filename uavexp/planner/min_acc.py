@@ -31,6 +31,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -177,7 +178,12 @@ class MinAcc:
         result = summed(failed, self._attempt(request, closer, search), "passes movers closely")
         if result.trajectory is not None:
             return result
-        stop, aside = safest_stop(request, settings, limits)
+        stop, aside = safest_stop(
+            request,
+            moving_obstacles(request, settings),
+            partial(fixed_shortfall, request, settings),
+            limits,
+        )
         reason = "steps aside first" if aside else "brakes first"
         return self._stop_first(request, stop, closer, search, result, reason)
 

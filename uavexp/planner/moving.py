@@ -81,7 +81,7 @@ def _arrival_s(length_m: float, start_mps: float, speed_mps: float, acceleration
 @nb.njit(cache=True)
 def _stamp(
     distance: Float32, origin_m: Float, voxel_m: float, movers: Float, low: Float, high: Float,
-    start_m: Float, pace: Float, above_m: float,
+    start_m: Float, pace: Float, above_m: float, floor_m: float,
 ) -> None:  # fmt: skip
     """Lower the distances of cells within a box that a mover is near when the vehicle gets there."""
     first, last = np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64)
@@ -93,13 +93,13 @@ def _stamp(
         for j in range(first[1], last[1] + 1):
             y = origin_m[1] + (j + 0.5) * voxel_m
             for k in range(first[2], last[2] + 1):
-                if distance[i, j, k] <= _LEAST_M:
+                if distance[i, j, k] <= floor_m:
                     continue
                 z = origin_m[2] + (k + 0.5) * voxel_m
                 away = math.sqrt((x - start_m[0]) ** 2 + (y - start_m[1]) ** 2 + (z - start_m[2]) ** 2)
                 ahead_s = _arrival_s(away, pace[0], pace[1], pace[2])
                 clearance = clearance_after(movers, x, y, z, ahead_s) + above_m
-                distance[i, j, k] = min(distance[i, j, k], max(clearance, _LEAST_M))
+                distance[i, j, k] = min(distance[i, j, k], max(clearance, floor_m))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,6 +157,7 @@ class MovingObstacles:
         acceleration_mps2: float,
         least_m: float,
         safe_m: float,
+        solid: bool = False,
     ) -> DistanceField:
         """The request's map with every mover where the vehicle would meet it.
 
@@ -170,6 +171,8 @@ class MovingObstacles:
             acceleration_mps2: with which it is reached.
             least_m: clearance limit of the search.
             safe_m: clearance from which on the search does not care.
+            solid: whether they have an inside, as what stands has: for planners that go by surfaces; a
+                start within is then blocked.
         """
         field, table = request.field, self.table(request.time_s)
         distance = field.distance.copy()
@@ -180,7 +183,7 @@ class MovingObstacles:
             low_m, high_m = ends_m.min(axis=0) - reach_m, ends_m.max(axis=0) + reach_m
             _stamp(
                 distance, field.origin_m, field.voxel_size_m, row[None], low_m, high_m,
-                request.position_m, pace, least_m,
+                request.position_m, pace, least_m, -np.inf if solid else _LEAST_M,
             )  # fmt: skip
         return replace(field, distance=distance)
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from uavexp.errors import require, require_non_negative, require_option, require_positive
+from uavexp.planner.among import plan_among
 from uavexp.planner.ompl_process import Query, require_ompl, search_with_ompl
 from uavexp.planner.sampling import (
     FoundWay,
@@ -33,6 +34,8 @@ class Rrtstar:
     goal_bias: float = 0.05
     rewire_factor: float = 1.1
     max_iterations: int = 6_000
+    mover_margin_m: float = 0.5
+    mover_horizon_s: float = 2.0
     smoothing: Smoothing = Smoothing.BSPLINE_QP
     derivative: str = "acceleration"
     _limits: Limits | None = field(default=None, init=False, repr=False)
@@ -45,7 +48,12 @@ class Rrtstar:
             max_edge_m=self.max_edge_m,
             rewire_factor=self.rewire_factor,
         )
-        require_non_negative(z_band_m=self.z_band_m, goal_bias=self.goal_bias)
+        require_non_negative(
+            mover_margin_m=self.mover_margin_m,
+            mover_horizon_s=self.mover_horizon_s,
+            z_band_m=self.z_band_m,
+            goal_bias=self.goal_bias,
+        )
         require(self.goal_bias <= 1.0, f"goal_bias must be in [0, 1], got {self.goal_bias}")
         require_whole(max_iterations=self.max_iterations)
         require_known_or_not(self.unknown)
@@ -64,8 +72,22 @@ class Rrtstar:
 
     def plan(self, request: PlanRequest) -> PlanResult:
         """Return a trajectory or the reason why there is none (`Planner.plan`)."""
-        if self._limits is None or self._smoother is None:
+        if self._limits is None:
             raise RuntimeError("plan() needs reset() first")
+        return plan_among(
+            request,
+            self._plan,
+            self._limits,
+            margin_m=self.mover_margin_m,
+            horizon_s=self.mover_horizon_s,
+            min_clearance_m=self.min_clearance_m,
+            known_only=self.unknown == "conservative",
+        )
+
+    def _plan(self, request: PlanRequest) -> PlanResult:
+        """Plan in the map as it is."""
+        assert self._limits is not None
+        assert self._smoother is not None
         began_s = time.perf_counter()
         known_only = self.unknown == "conservative"
         refused = refusal(request, self._limits, self.min_clearance_m, known_only)
