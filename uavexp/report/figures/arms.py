@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _ACROSS = 4  # panels in a row
+_LABEL = 26  # characters in a line below a panel
 
 
 def metric_panels(
@@ -25,7 +27,7 @@ def metric_panels(
     there = [metric for metric in metrics if panel.has(metric)]
     across = min(_ACROSS, len(there))
     down = math.ceil(len(there) / across)
-    figure = canvas.new_figure(canvas.PAGE_IN, down * (0.75 + 0.22 * len(panel.arms)))
+    figure = canvas.new_figure(canvas.PAGE_IN, down * (0.85 + 0.22 * len(panel.arms)))
     grid = figure.subplots(down, across, sharey=True, squeeze=False).ravel()
     for axes, metric in zip(grid, there, strict=False):
         for place, arm in enumerate(panel.arms):
@@ -33,7 +35,7 @@ def metric_panels(
             printed = reference.get((metric.column, arm))
             if printed is not None:
                 axes.plot(printed.mean, place, "D", mfc="none", mec=canvas.GREY, ms=6, mew=0.9, zorder=1)
-        axes.set_xlabel(metric.label, fontsize=7.5)
+        axes.set_xlabel(textwrap.fill(metric.label, _LABEL), fontsize=7.5)
         axes.margins(x=0.12)
     for axes in grid[len(there) :]:
         axes.remove()
