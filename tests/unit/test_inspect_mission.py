@@ -12,11 +12,14 @@ import pytest
 from tests.inspections import START_M, building
 from tests.logs import make_world
 from tests.unit.test_trigger import LIMITS, change, observe
+from uavexp.cli.composition import Composer
+from uavexp.cli.overrides import parse_settings
 from uavexp.errors import ConfigError, WorldError
 from uavexp.geometry import quaternion_from_yaw
+from uavexp.inspection.plan import nearest_order
 from uavexp.inspection.travel import travel_matrix
 from uavexp.mapping.base import OCCUPIED, DistanceField
-from uavexp.mission.inspect import Inspect, nearest_order
+from uavexp.mission.inspect import Inspect
 from uavexp.mission.tour_guide import TourGuide
 from uavexp.scene import Scene
 from uavexp.types import Goal, Observation, Outcome, State, TrialLog, World
@@ -183,3 +186,17 @@ def test_a_vehicle_that_fits_nowhere_gets_a_clear_end() -> None:
 def test_impossible_parameters_are_refused(values: dict[str, Any], words: str) -> None:
     with pytest.raises(ConfigError, match=words):
         Inspect(**values)
+
+
+@pytest.mark.parametrize(
+    ("typed", "world"),
+    [
+        ("mission=inspect", "facility"),
+        ("strategy=inspect", "facility"),
+        ("mission=inspect world=rooms", "rooms"),
+        ("mission=goto", "warehouse"),
+    ],
+)
+def test_an_inspection_is_flown_in_the_facility_unless_told_otherwise(typed: str, world: str) -> None:
+    command = Composer().command(parse_settings(typed.split()))
+    assert command.cells[0].options["world"] == world

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -207,6 +207,31 @@ def path_from(start_m: Float, travel_m: Float, seed: int) -> Int:
     cost[1:, 1:] = travel_m
     cost[0, 1:] = cost[1:, 0] = start_m
     return open_tour(cost, seed=seed)[1:] - 1
+
+
+def visited_by_nearest(plan: InspectionPlan, settings: Settings) -> InspectionPlan:
+    """The plan with its viewpoints in the order of nearest neighbours, merged and reordered like any."""
+    segment, travel, start = plan.viewpoints.segment, plan.travel_m, plan.start_travel_m
+    limits = settings.largest_outlier, settings.max_lengthening
+    visit = runs.clusters_of(nearest_order(start, travel), segment)
+    visit = runs.merge_outliers(visit, segment, travel, start, *limits)
+    return replace(plan, clusters=runs.reordered(visit, travel, start))
+
+
+def nearest_order(start_m: Float, travel_m: Float) -> Int:
+    """Always to the nearest viewpoint that is left (V,).
+
+    Args:
+        start_m: travel lengths from the vehicle to each viewpoint (V,).
+        travel_m: between viewpoints (V, V).
+    """
+    order: list[int] = []
+    cost = start_m.copy()
+    for _ in range(len(start_m)):
+        cost[order] = np.inf
+        order.append(int(np.argmin(cost)))
+        cost = travel_m[order[-1]].copy()
+    return np.array(order, dtype=np.int64)
 
 
 def adapt_order(

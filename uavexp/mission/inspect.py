@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -20,8 +19,7 @@ from uavexp.errors import (
 )
 from uavexp.explorer.base import Explorer
 from uavexp.geometry import yaw_of
-from uavexp.inspection import clusters as runs
-from uavexp.inspection.plan import InspectionPlan, Settings, plan_inspection
+from uavexp.inspection.plan import InspectionPlan, Settings, plan_inspection, visited_by_nearest
 from uavexp.inspection.reference import reference_field, surface_of_mesh
 from uavexp.inspection.view_angle import Weights
 from uavexp.inspection.viewpoints import Pattern
@@ -30,7 +28,7 @@ from uavexp.mission import unforeseen
 from uavexp.mission.coverage import Coverage, visible_anywhere
 from uavexp.mission.tour_guide import Look, TourGuide
 from uavexp.scene import Scene
-from uavexp.types import Float, Int, Limits, Observation, Outcome, State, Surface, World
+from uavexp.types import Float, Limits, Observation, Outcome, State, Surface, World
 
 LOOK_S = 0.2  # between the instants at which the camera earns coverage
 
@@ -80,6 +78,8 @@ class Inspect:
         blocked_below_m: mapped distance below which a viewpoint is blocked.
         rounds: of more viewpoints, by the live map, for what the plan's have left unseen.
         rate_hz: of the choice of viewpoint and yaw.
+        keep_m: of the body from predicted movers at a viewpoint; while one comes nearer, others are
+            visited first, or the vehicle steps aside.
         time_base_s: time limit = this ...
         time_per_viewpoint_s: ... plus this for each viewpoint ...
         time_per_path_spm: ... plus this for each metre of the tour.
@@ -115,6 +115,7 @@ class Inspect:
     blocked_below_m: float = 0.3
     rounds: int = 1
     rate_hz: float = 5.0
+    keep_m: float = 0.5
     time_base_s: float = 120.0
     time_per_viewpoint_s: float = 8.0
     time_per_path_spm: float = 4.0
@@ -153,6 +154,7 @@ class Inspect:
             turn_deg=self.turn_deg,
             again_after_s=self.again_after_s,
             blocked_below_m=self.blocked_below_m,
+            keep_m=self.keep_m,
             time_per_viewpoint_s=self.time_per_viewpoint_s,
             time_per_path_spm=self.time_per_path_spm,
         )
@@ -216,6 +218,7 @@ class Inspect:
             rounds=self.rounds,
             weights=self._weights(),
             rate_hz=self.rate_hz,
+            keep_m=self.keep_m,
         )
         self._time_limit_s = (
             self.time_base_s
@@ -270,7 +273,7 @@ class Inspect:
         map_ = reference_field(vertices, triangles, world.bounds_m)
         surface = surface_of_mesh(vertices, target, map_, start_m, self.cell_m)
         plan = plan_inspection(surface, map_, self._camera(), start_m, world.flight_bounds_m, settings)
-        return plan if self.tour is Tour.LIN_KERNIGHAN else _by_nearest(plan, settings)
+        return plan if self.tour is Tour.LIN_KERNIGHAN else visited_by_nearest(plan, settings)
 
     def _camera(self) -> Camera:
         return Camera(
@@ -298,28 +301,3 @@ class Inspect:
         if self._guide is None:
             raise RuntimeError("reset(world) first")
         return self._guide
-
-
-def _by_nearest(plan: InspectionPlan, settings: Settings) -> InspectionPlan:
-    """The plan with its viewpoints in the order of nearest neighbours, merged and reordered like any."""
-    segment, travel, start = plan.viewpoints.segment, plan.travel_m, plan.start_travel_m
-    limits = settings.largest_outlier, settings.max_lengthening
-    visit = runs.clusters_of(nearest_order(start, travel), segment)
-    visit = runs.merge_outliers(visit, segment, travel, start, *limits)
-    return dataclasses.replace(plan, clusters=runs.reordered(visit, travel, start))
-
-
-def nearest_order(start_m: Float, travel_m: Float) -> Int:
-    """Always to the nearest viewpoint that is left (V,).
-
-    Args:
-        start_m: travel lengths from the vehicle to each viewpoint (V,).
-        travel_m: between viewpoints (V, V).
-    """
-    order: list[int] = []
-    cost = start_m.copy()
-    for _ in range(len(start_m)):
-        cost[order] = np.inf
-        order.append(int(np.argmin(cost)))
-        cost = travel_m[order[-1]].copy()
-    return np.array(order, dtype=np.int64)

@@ -5,6 +5,9 @@ the map blocks, or that no plan reaches, is put off to the end of the visit, and
 that happens again. With view adaptation (paper 3, algorithm 2) the yaw is the one that sees
 the most that is new, and a stop is left when no yaw there would see anything worth it; without,
 it is the planned one. After the last stop, more are made for what is still unseen [ours].
+
+Among movers, while one may come near the way to the next stop, or to the stop itself, the vehicle
+steps aside (`give_way`); when that takes long, one of the stops after it is visited first [ours].
 """
 
 from __future__ import annotations
@@ -16,14 +19,15 @@ from enum import StrEnum
 import numpy as np
 
 from uavexp.geometry import wrap_angle, yaw_of
-from uavexp.inspection.lattice import lattice_of
-from uavexp.inspection.plan import InspectionPlan, Settings, adapt_order, path_from, sparse_places
-from uavexp.inspection.travel import is_reachable, travel_lengths, travel_matrix
+from uavexp.inspection.plan import InspectionPlan, Settings, adapt_order
 from uavexp.inspection.view_angle import Weights, cell_weights, choose_yaw
-from uavexp.inspection.viewpoints import Viewpoints, added
-from uavexp.inspection.visibility import Camera, Grid, Views, visible_cells, witnesses
-from uavexp.mapping.base import DistanceField
+from uavexp.inspection.viewpoints import Viewpoints
+from uavexp.inspection.visibility import Camera, visible_cells
+from uavexp.mission.give_way import aside_m, room_along_m, rooms_m, turns_s
+from uavexp.mission.more_stops import live_grid, more_stops
 from uavexp.types import Bool, Float, Goal, Limits, Observation
+
+ALTERNATIVES = 4  # so many of the next stops may be visited before one that has to wait
 
 
 class Look(StrEnum):
@@ -60,6 +64,7 @@ class TourGuide:
         rounds: of more stops after the planned ones.
         weights: of cells for the choice of yaw.
         rate_hz: of choices.
+        keep_m: of the body from predicted movers at a stop.
     """
 
     plan: InspectionPlan
@@ -75,6 +80,7 @@ class TourGuide:
     rounds: int
     weights: Weights
     rate_hz: float
+    keep_m: float
     scanned: Bool = field(init=False, repr=False)  # (N,) cells believed to have been seen
     visited_s: Float = field(init=False, repr=False)  # (V,) of the planned stops; inf: never
     _stops: Viewpoints = field(init=False, repr=False)
@@ -83,8 +89,10 @@ class TourGuide:
     _order: list[int] = field(init=False, repr=False)
     _blocked: Bool = field(init=False, repr=False)  # (V,) planned stops the live map has blocked
     _arrived_s: float = field(init=False, repr=False, default=math.inf)
+    _waiting_s: float = field(init=False, repr=False, default=math.inf)  # since when, for movers to pass
     _yaw_rad: float = field(init=False, repr=False, default=math.nan)
     _finished: bool = field(init=False, repr=False, default=False)
+    _limits: Limits | None = field(init=False, repr=False, default=None)
 
     def __post_init__(self) -> None:
         count = len(self.plan.viewpoints)
@@ -99,7 +107,8 @@ class TourGuide:
         return self._finished
 
     def reset(self, flight_height_m: float, limits: Limits) -> None:
-        """Nothing is left of an earlier trial: the guide is made anew for each."""
+        """Take the vehicle's limits; nothing else is left of an earlier trial."""
+        self._limits = limits
 
     def reject(self, position_m: Float, time_s: float) -> None:
         """No plan leads to a stop: put it off or give it up."""
@@ -124,7 +133,7 @@ class TourGuide:
         looks = self.look is Look.ADAPTIVE or self._has_arrived(stop, observation)
         if not fresh:
             self._yaw_rad = self._wanted_yaw_rad(stop, observation) if looks else math.nan
-        place_m = self._stops.position_m[stop]
+        place_m = self._place_m(stop, observation)
         return Goal(
             position_m=place_m,
             is_target=True,
@@ -149,7 +158,43 @@ class TourGuide:
         if not left and not self._finished:
             self._go_on(observation)
             left = self._order
-        return next((stop for stop in left if self._after_s[stop] <= observation.time_s), None)
+        ready = [stop for stop in left if self._after_s[stop] <= observation.time_s]
+        if not ready or self._is_free(ready[0], observation):
+            self._waiting_s = math.inf
+            return next(iter(ready), None)
+        self._waiting_s = min(self._waiting_s, observation.time_s)
+        if observation.time_s - self._waiting_s < self.again_after_s:
+            return ready[0]
+        free = next((s for s in ready[1:ALTERNATIVES] if self._is_free(s, observation)), ready[0])
+        self._order.remove(free)
+        self._order.insert(0, free)
+        return free
+
+    def _is_free(self, stop: int, observation: Observation) -> bool:
+        """Whether no mover may come near on the way to a stop, as flown if that is under way, or there."""
+        tracks, limits, goal = observation.tracks, self._limits, observation.goal
+        if limits is None or not len(tracks):
+            return True
+        place_m, here_m = self._stops.position_m[stop], observation.state.position_m
+        turn_s = turns_s(tracks, observation.field)
+        if (
+            observation.trajectory is not None
+            and goal is not None
+            and np.array_equal(goal.position_m, place_m)
+        ):
+            room_m = room_along_m(tracks, turn_s, observation.trajectory, observation.time_s)
+        else:
+            room_m = float(rooms_m(tracks, turn_s, here_m, place_m[None], limits, way=True)[0])
+        return room_m >= limits.body_radius_m + self.keep_m
+
+    def _place_m(self, stop: int, observation: Observation) -> Float:
+        """Where to go for a stop: to it, or aside while movers come there."""
+        limits = self._limits
+        if limits is None or self._is_free(stop, observation):
+            return np.asarray(self._stops.position_m[stop])
+        live, here_m = observation.field, observation.state.position_m
+        keep_m = limits.body_radius_m + self.keep_m
+        return aside_m(observation.tracks, live, here_m, self.plan.lattice.position_m, keep_m, limits)
 
     def _postpone_blocked(self, observation: Observation) -> None:
         """Put off the stops at the head of the order on which the live map shows an obstacle."""
@@ -217,14 +262,14 @@ class TourGuide:
             return planned_rad
         surface, views = self.plan.surface, self.plan.views
         weight = cell_weights(surface, views, self._blocked, self.scanned, self.weights)
-        grid, position_m = _grid(observation.field), observation.state.position_m
+        grid, position_m = live_grid(observation.field), observation.state.position_m
         return choose_yaw(grid, self.camera, surface, weight, position_m, planned_rad).yaw_rad
 
     def _seen_now(self, observation: Observation, yaw_rad: float) -> Bool:
         """Cells (N,) that the camera would see from here with a yaw, by the live map."""
         surface, seen = self.plan.surface, np.zeros(len(self.scanned), dtype=np.bool_)
         eye_m = np.ascontiguousarray(observation.state.position_m)
-        grid, optics = _grid(observation.field), self.camera.optics
+        grid, optics = live_grid(observation.field), self.camera.optics
         seen[visible_cells(grid, optics, eye_m, yaw_rad, surface.point_m, surface.normal)] = True
         return seen
 
@@ -237,45 +282,6 @@ class TourGuide:
         if self._finished:
             return
         self.rounds -= 1
-        self._begin(*self._more_stops(observation))
-
-    def _more_stops(self, observation: Observation) -> tuple[Viewpoints, list[int]]:
-        """Stops for the cells not yet scanned, by the live map, in the order of a short path."""
-        settings, live = self.settings, observation.field
-        position_m, bounds_m = observation.state.position_m, observation.flight_bounds_m
-        lattice = lattice_of(
-            live, bounds_m, position_m, settings.clearance_m, settings.cell_m, settings.layer_m
+        self._begin(
+            *more_stops(self.plan.surface.part(~self.scanned), observation, self.camera, self.settings)
         )
-        eyes_m, left = sparse_places(lattice), self.plan.surface.part(~self.scanned)
-        witness = witnesses(_grid(live), self.camera.optics, eyes_m, left.point_m, left.normal)
-
-        def fits(points_m: Float) -> Bool:
-            inside = ((points_m >= bounds_m[0]) & (points_m <= bounds_m[1])).all(axis=1)
-            return np.asarray(inside & is_reachable(lattice, points_m))
-
-        nothing = Viewpoints(
-            position_m=np.zeros((0, 3)), yaw_rad=np.zeros(0), segment=np.zeros(0, dtype=np.int64)
-        )
-        unowned = np.full(len(left), -1)
-        unseen = Views(np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int32))
-        stops = added(
-            left,
-            unowned,
-            nothing,
-            unseen,
-            eyes_m,
-            witness,
-            _grid(live),
-            self.camera,
-            settings.pattern,
-            fits,
-        )
-        start_m = travel_lengths(lattice, position_m[None], stops.position_m)[0]
-        if len(stops) == 0 or not np.isfinite(start_m).all():
-            return stops, list(range(len(stops)))
-        order = path_from(start_m, travel_matrix(lattice, stops.position_m), settings.seed)
-        return stops, [int(stop) for stop in order]
-
-
-def _grid(live: DistanceField) -> Grid:
-    return Grid(live.state, live.origin_m, live.voxel_size_m)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
 import pandas as pd
 
 from uavexp.metrics import coverage
-from uavexp.report import inspection_view, plan_view
+from uavexp.report import inspection_view, movers_view, plan_view
 from uavexp.report.figures import canvas, flown
 from uavexp.report.figures.looks import Look
 from uavexp.report.parts import Drawing
@@ -16,7 +17,7 @@ from uavexp.study import Study
 from uavexp.types import Float, TrialLog, World
 
 KIND = "scene_kind"  # column: what the reference does not show
-_LEGEND_IN, _TITLE_IN = 0.8, 0.4
+_LEGEND_IN, _TITLE_IN, _AXIS_IN = 1.0, 0.4, 0.45
 _TIMES = 300  # at which coverage is drawn
 
 
@@ -30,7 +31,7 @@ def plans(study: Study, note: str) -> Drawing | None:
         return None
     views = [plan_view.view_m(world, log) for world, log, _ in flights]
     width_m, depth_m = np.max([view[1] - view[0] for view in views], axis=0)
-    plan_in = canvas.PAGE_IN / len(flights) * depth_m / width_m
+    plan_in = (canvas.PAGE_IN / len(flights) - _AXIS_IN) * depth_m / width_m
     figure = canvas.new_figure(canvas.PAGE_IN, plan_in + _LEGEND_IN + _TITLE_IN)
     for number, (world, log, name) in enumerate(flights):
         axes = figure.add_subplot(1, len(flights), number + 1)
@@ -38,8 +39,11 @@ def plans(study: Study, note: str) -> Drawing | None:
         seen = 100.0 * coverage.coverage_visible(log)
         axes.set_title(f"{name}: {seen:.1f} % of the visible seen", fontsize=8)
         axes.tick_params(labelsize=7)
-    handles = inspection_view.handles(*flights[-1][:2])
-    figure.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=7)
+        axes.set_xlabel("x [m]", fontsize=8)
+        axes.set_ylabel("" if number else "y [m]", fontsize=8)
+    world, log, _ = flights[-1]
+    handles = [*inspection_view.handles(world, log), *movers_view.handles(log, math.nan)]
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize=7)
     return Drawing(name="plans", caption=f"{_PLANS} {note}", figure=figure)
 
 
