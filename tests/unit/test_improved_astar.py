@@ -158,6 +158,20 @@ def test_a_reversal_in_the_open_is_removed_and_one_round_a_wall_kept() -> None:
     assert len(without_reversals(free, spur)) == 3
 
 
+@pytest.mark.parametrize(("least", "count"), [(0.0, 3), (0.1, 1), (0.6, 0)])
+def test_small_swings_of_height_are_no_reversals(least: float, count: int) -> None:
+    """An end that lies 0.03 below its voxel's centre, up by 0.5, down by 0.4, and 0.02 up to the other end."""
+    heights = [0.0, 0.03, 0.03, 0.53, 0.13, 0.15, 0.13]
+    path = np.column_stack([np.arange(7.0), np.zeros(7), heights])
+    assert height_reversals(path, least) == count
+
+
+def test_reversals_are_the_changes_of_sign_where_every_swing_counts() -> None:
+    heights = np.random.default_rng(0).normal(0.0, 1.0, 60).cumsum()
+    path = np.column_stack([np.arange(60.0), np.zeros(60), heights])
+    assert height_reversals(path) == np.count_nonzero(np.diff(np.sign(np.diff(heights))))
+
+
 def test_metrics_of_a_path_by_hand() -> None:
     path = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 1], [3, 0, 1], [4, 0, 0], [4, 0, 0], [5, 0, 1.0]])
     assert path_length(path) == pytest.approx(2.0 + 3.0 * np.sqrt(2.0))

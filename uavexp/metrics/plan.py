@@ -16,6 +16,7 @@ from uavexp.types import Bool, Float, Trajectory, TrialLog, World
 
 GRID_S = 1e-3
 CHECKPOINTS = tuple(n * 10**k for k in range(1, 6) for n in (1, 2, 5))  # iterations
+SWING_M = 0.1  # of height; less is no climb: the ends lie off their voxels' centres [ours]
 _EXCESS = 1.0 + 1e-6
 
 
@@ -50,7 +51,7 @@ def measures(log: TrialLog, world: World) -> dict[str, float]:
         float(stretches(clearance_m < log.body_radius_m)),
         float(log.plan_collision_checks),
         float(log.replans[0].expansions) if log.replans else float("nan"),
-        float(voxel_path.height_reversals(path_m)),
+        float(voxel_path.height_reversals(path_m, SWING_M)),
         voxel_path.excess_climb(path_m),
         float(np.degrees(voxel_path.cumulative_heading_change_rad(path_m))),
         float(np.degrees(voxel_path.mean_heading_change_rad(path_m))),

@@ -22,11 +22,23 @@ def path_length(path: Float) -> float:
     return float(np.linalg.norm(_steps(path), axis=1).sum())
 
 
-def height_reversals(path: Float) -> int:
-    """How often climbing turns into sinking or back: sign changes of Δz, level steps left out."""
-    rise = _steps(path)[:, 2]
-    rise = rise[np.abs(rise) > _LEVEL * (1.0 + np.abs(rise).max(initial=0.0))]
-    return int(np.count_nonzero(np.diff(np.sign(rise))))
+def height_reversals(path: Float, least: float = 0.0) -> int:
+    """How often climbing turns into sinking or back: sign changes of Δz, level steps left out.
+
+    Args:
+        path: (P, 3).
+        least: swings of height up to this are no climb, as where the exact ends lie off their voxels' centres.
+    """
+    height = np.asarray(path, dtype=np.float64)[:, 2]
+    least = max(least, _LEVEL * (1.0 + np.ptp(height) if len(height) else 1.0))
+    way, turn, count = 0, height[0] if len(height) else 0.0, 0
+    for z in height:
+        if way * (z - turn) > 0.0 or (way == 0 and abs(z - turn) <= least):
+            turn = z if way else turn
+        elif abs(z - turn) > least:
+            count += way != 0
+            way, turn = (1 if z > turn else -1), z
+    return count
 
 
 def excess_climb(path: Float) -> float:
