@@ -160,7 +160,7 @@ def test_a_reversal_in_the_open_is_removed_and_one_round_a_wall_kept() -> None:
 
 @pytest.mark.parametrize(("least", "count"), [(0.0, 3), (0.1, 1), (0.6, 0)])
 def test_small_swings_of_height_are_no_reversals(least: float, count: int) -> None:
-    """An end that lies 0.03 below its voxel's centre, up by 0.5, down by 0.4, and 0.02 up to the other end."""
+    """An end 0.03 below its voxel's centre, up by 0.5, down by 0.4, and 0.02 down to the other end."""
     heights = [0.0, 0.03, 0.03, 0.53, 0.13, 0.15, 0.13]
     path = np.column_stack([np.arange(7.0), np.zeros(7), heights])
     assert height_reversals(path, least) == count

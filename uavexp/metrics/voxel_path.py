@@ -27,7 +27,7 @@ def height_reversals(path: Float, least: float = 0.0) -> int:
 
     Args:
         path: (P, 3).
-        least: swings of height up to this are no climb, as where the exact ends lie off their voxels' centres.
+        least: smaller swings of height are no climb, as where the ends lie off their voxels' centres.
     """
     height = np.asarray(path, dtype=np.float64)[:, 2]
     least = max(least, _LEVEL * (1.0 + np.ptp(height) if len(height) else 1.0))
