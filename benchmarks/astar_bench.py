@@ -17,12 +17,12 @@ import time
 
 import numpy as np
 
+from uavexp.geometry import polyline_length_m
 from uavexp.metrics.voxel_path import (
     cumulative_heading_change_rad,
     excess_climb,
     height_reversals,
     mean_heading_change_rad,
-    path_length,
 )
 from uavexp.planner.improved_astar import ImprovedAstar
 from uavexp.planner.voxel.grid import VoxelGrid, VoxelPath
@@ -127,7 +127,7 @@ def compare() -> None:
                     for value in (
                         height_reversals(path),
                         voxel_m * excess_climb(path),
-                        voxel_m * path_length(path),
+                        voxel_m * polyline_length_m(path),
                         np.degrees(cumulative_heading_change_rad(path)),
                         np.degrees(mean_heading_change_rad(path)),
                     )

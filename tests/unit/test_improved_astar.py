@@ -11,13 +11,12 @@ from tests.contract.test_planner_contract import LIMITS, ask
 from tests.fields import box, empty, field_from
 from tests.voxel_paths import is_path, random_grid, turning
 from uavexp.errors import ConfigError
-from uavexp.geometry import evaluate
+from uavexp.geometry import evaluate, polyline_length_m
 from uavexp.metrics.voxel_path import (
     cumulative_heading_change_rad,
     excess_climb,
     height_reversals,
     mean_heading_change_rad,
-    path_length,
 )
 from uavexp.planner.improved_astar import ImprovedAstar
 from uavexp.planner.timing import resample
@@ -141,7 +140,7 @@ def test_smoothing_keeps_ends_stays_free_and_shortens() -> None:
         curve = smoothed(free, path)
         np.testing.assert_allclose(curve[[0, -1]], path[[0, -1]])
         assert all(in_sight(free, a, b) for a, b in pairwise(curve))
-        assert path_length(curve) <= path_length(path) + 1e-9
+        assert polyline_length_m(curve) <= polyline_length_m(path) + 1e-9
 
 
 def test_key_waypoints_of_a_straight_run_are_its_ends() -> None:
@@ -174,7 +173,7 @@ def test_reversals_are_the_changes_of_sign_where_every_swing_counts() -> None:
 
 def test_metrics_of_a_path_by_hand() -> None:
     path = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 1], [3, 0, 1], [4, 0, 0], [4, 0, 0], [5, 0, 1.0]])
-    assert path_length(path) == pytest.approx(2.0 + 3.0 * np.sqrt(2.0))
+    assert polyline_length_m(path) == pytest.approx(2.0 + 3.0 * np.sqrt(2.0))
     assert height_reversals(path) == 2  # up, level, down, up
     assert excess_climb(path) == pytest.approx(3.0 - 1.0)
     turns = np.array([45.0, 45.0, 45.0, 90.0])

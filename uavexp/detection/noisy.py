@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from uavexp.bodies import distance_m, present
+from uavexp.bodies import present
 from uavexp.detection.kalman import Estimate, Motion, MotionFilter
-from uavexp.detection.returns import returns, without
+from uavexp.detection.returns import without_bodies
 from uavexp.errors import require, require_non_negative, require_option, require_positive
 from uavexp.mapping.base import DistanceField
 from uavexp.types import Bodies, Int, Limits, Scan, Tracks
@@ -59,8 +59,7 @@ class Noisy:
             covariance=np.stack([one.covariance for one in filters]),
             half_size_m=truth.half_size_m[there],
         )
-        seen = returns(scan)
-        return without(scan, seen.where[distance_m(truth, seen.points_m) <= self.margin_m]), tracks
+        return without_bodies(scan, truth, self.margin_m), tracks
 
     def _observe(self, time_s: float, truth: Bodies, there: Int) -> None:
         """Filter the bodies that are there on; forget those that are not."""

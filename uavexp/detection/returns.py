@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numba as nb
 import numpy as np
 
-from uavexp.types import Bool, DepthScan, Float, Float32, Int, Scan, UInt8
+from uavexp.bodies import distance_m
+from uavexp.types import Bodies, Bool, DepthScan, Float, Float32, Int, Scan, UInt8
 
 
 class Returns(NamedTuple):
@@ -107,3 +108,9 @@ def without(scan: Scan, index: Int) -> Scan:
     if isinstance(scan, DepthScan):
         return replace(scan, depth_m=values)
     return replace(scan, range_m=values)
+
+
+def without_bodies(scan: Scan, bodies: Bodies, margin_m: float) -> Scan:
+    """The scan without what was measured within a margin of the bodies that are there."""
+    seen = returns(scan)
+    return without(scan, seen.where[distance_m(bodies, seen.points_m) <= margin_m])

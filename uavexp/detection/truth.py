@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uavexp.bodies import distance_m, present
-from uavexp.detection.returns import returns, without
+from uavexp.bodies import present
+from uavexp.detection.returns import without_bodies
 from uavexp.errors import require_non_negative
 from uavexp.mapping.base import DistanceField
 from uavexp.types import Bodies, Limits, Scan, Tracks
@@ -38,5 +38,4 @@ class Truth:
         )
         if not len(there):
             return scan, tracks
-        seen = returns(scan)
-        return without(scan, seen.where[distance_m(truth, seen.points_m) <= self.margin_m]), tracks
+        return without_bodies(scan, truth, self.margin_m), tracks

@@ -24,7 +24,7 @@ from uavexp.mapping.base import FREE, OCCUPIED, DistanceField
 from uavexp.mapping.esdf import SignedDistance, distance_table
 from uavexp.mapping.occupancy import grid_shape
 from uavexp.scene import Scene
-from uavexp.types import Float, Float32, Int, MapUpdate, Scan, UInt8
+from uavexp.types import Bool, Float, Float32, Int, MapUpdate, Scan, UInt8
 
 _BYTES_PER_VOXEL = 80  # ESDF 19, centres, rays and distances while it is made
 _BLOCKS = (8, 4, 2)  # edges of the blocks of voxels asked first, each half the one before
@@ -85,17 +85,20 @@ def _near_surfaces(
     near = np.ones([math.ceil(n / _BLOCKS[0]) for n in shape], dtype=bool)
     for at, edge in enumerate(_BLOCKS):
         if at:
-            near = (
-                near.repeat(2, 0).repeat(2, 1).repeat(2, 2)[tuple(slice(math.ceil(n / edge)) for n in shape)]
-            )
+            near = _halved(near, shape, edge)
         block = np.argwhere(near)
         half_m = 0.5 * (edge - 1) * voxel_m  # from the block's centre to those of its outermost voxels
         centres_m = origin_m + (block + 0.5) * edge * voxel_m
         near[tuple(block.T)] = (
             scene.fixed_distance_m(centres_m) <= reach_m + math.sqrt(3.0) * half_m + _SAME_M
         )
-    near = near.repeat(2, 0).repeat(2, 1).repeat(2, 2)[tuple(slice(n) for n in shape)]
-    return np.flatnonzero(near)
+    return np.flatnonzero(_halved(near, shape, 1))
+
+
+def _halved(blocks: Bool, shape: tuple[int, ...], edge: int) -> Bool:
+    """Flags of blocks of twice this edge as flags of the blocks of this edge that cover the voxels."""
+    fine: Bool = blocks.repeat(2, 0).repeat(2, 1).repeat(2, 2)
+    return fine[tuple(slice(math.ceil(n / edge)) for n in shape)]
 
 
 @dataclass(slots=True, kw_only=True)

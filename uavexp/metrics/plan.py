@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from uavexp.geometry import evaluate
+from uavexp.geometry import evaluate, polyline_length_m
 from uavexp.metrics import voxel_path
 from uavexp.scene import Scene
 from uavexp.types import Bool, Float, Trajectory, TrialLog, World
@@ -41,8 +41,8 @@ def measures(log: TrialLog, world: World) -> dict[str, float]:
     clearance_m = Scene(world).fixed_distance_m(position_m)
     over = (speed_mps > _EXCESS * log.max_speed_mps) | (size_mps2 > _EXCESS * log.max_acceleration_mps2)
     values = (
-        voxel_path.path_length(path_m),
-        voxel_path.path_length(position_m),
+        polyline_length_m(path_m),
+        polyline_length_m(position_m),
         trajectory.duration_s,
         float(speed_mps.max()),
         float(size_mps2.max()),

@@ -13,13 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from uavexp.bodies import present
 from uavexp.types import Contact, Float, Int, TrialLog
 
 HORIZONS_S = (0.3, 0.6, 0.9, 1.2)
 MEAN_HORIZONS_S = tuple(0.1 * step for step in range(1, 13))  # the mean is taken over these
 GATE_M = 1.0
 WITHIN_M = 6.0
-_ABSENT_M = -500.0  # a mover below this height is not there (`bodies`)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -120,7 +120,7 @@ def quality(log: TrialLog, *, gate_m: float = GATE_M, within_m: float = WITHIN_M
     """
     ends = np.cumsum(log.track_count)
     truth_m = log.mover_position_m.astype(np.float64)
-    truth_m[truth_m[:, :, 2] <= _ABSENT_M] = np.nan  # whoever is not there cannot be predicted
+    truth_m[~present(truth_m)] = np.nan  # whoever is not there cannot be predicted
     previous: dict[int, int] = {}
     apart: list[float] = []
     ahead: list[Float] = []
@@ -129,7 +129,7 @@ def quality(log: TrialLog, *, gate_m: float = GATE_M, within_m: float = WITHIN_M
         mine = slice(end - log.track_count[tick], end)
         step = min(round(now_s / log.step_s), len(log.time_s) - 1)
         movers_m = log.mover_position_m[step].astype(np.float64)
-        there = movers_m[:, 2] > _ABSENT_M
+        there = present(movers_m)
         apart_m = np.linalg.norm(movers_m[:, None] - log.track_position_m[mine][None], axis=2)
         apart_m[~there] = np.inf
         identity = log.track_identity[mine]
@@ -173,13 +173,21 @@ def near_misses(time_s: Float, mover_clearance_m: Float, contacts: Sequence[Cont
         contacts: of the flight.
         near_m: limit, m.
     """
+    return len(near_miss_spans(time_s, mover_clearance_m, contacts, near_m))
+
+
+def near_miss_spans(
+    time_s: Float, mover_clearance_m: Float, contacts: Sequence[Contact], near_m: float
+) -> list[tuple[int, int]]:
+    """First and last row of each of the `near_misses`, in order of time."""
     near = np.concatenate([[False], mover_clearance_m < near_m, [False]])
     first, last = np.flatnonzero(near[1:] & ~near[:-1]), np.flatnonzero(near[:-1] & ~near[1:]) - 1
     touched = [contact for contact in contacts if contact.mover >= 0]
-    return sum(
-        not any(one.start_s <= time_s[end] and one.end_s >= time_s[begin] for one in touched)
+    return [
+        (int(begin), int(end))
         for begin, end in zip(first, last, strict=True)
-    )
+        if not any(one.start_s <= time_s[end] and one.end_s >= time_s[begin] for one in touched)
+    ]
 
 
 def _mean(values: Float) -> float:

@@ -17,11 +17,6 @@ def _steps(path: Float) -> Float:
     return np.asarray(steps[np.linalg.norm(steps, axis=1) > 0.0])
 
 
-def path_length(path: Float) -> float:
-    """Σ of the lengths of the segments, in the path's unit."""
-    return float(np.linalg.norm(_steps(path), axis=1).sum())
-
-
 def height_reversals(path: Float, least: float = 0.0) -> int:
     """How often climbing turns into sinking or back: sign changes of Δz, level steps left out.
 

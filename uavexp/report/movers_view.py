@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch, Rectangle
 
 from uavexp.bodies import distance_m, present
-from uavexp.metrics.tracking_movers import GATE_M
+from uavexp.metrics.tracking_movers import GATE_M, near_miss_spans
 from uavexp.report import style
 from uavexp.types import Bodies, Bool, Float, Replan, Shape, TrialLog
 
@@ -157,14 +157,8 @@ def tracks_at(log: TrialLog, time_s: float) -> tuple[Float, Float]:
 
 def near_miss_rows(log: TrialLog, near_miss_m: float) -> tuple[int, ...]:
     """Row of the least distance in each near miss, as `metrics.tracking_movers` counts them."""
-    near = np.concatenate([[False], log.mover_clearance_m < near_miss_m, [False]])
-    edges = np.flatnonzero(near[1:] != near[:-1]).reshape(-1, 2)
-    touched = [contact for contact in log.contacts if contact.mover >= 0]
-    return tuple(
-        int(first + np.argmin(log.mover_clearance_m[first:end]))
-        for first, end in edges
-        if not any(one.start_s <= log.time_s[end - 1] and one.end_s >= log.time_s[first] for one in touched)
-    )
+    spans = near_miss_spans(log.time_s, log.mover_clearance_m, log.contacts, near_miss_m)
+    return tuple(int(first + np.argmin(log.mover_clearance_m[first : last + 1])) for first, last in spans)
 
 
 def nearest_mover(log: TrialLog, row: int) -> int:
