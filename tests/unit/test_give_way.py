@@ -101,6 +101,23 @@ def test_a_stop_to_which_somebody_comes_waits_and_then_others_come_first() -> No
     assert np.isinf(guide.visited_s[first])  # put behind, not given up
 
 
+def test_a_stop_at_which_somebody_stays_is_given_up_after_waiting_twice() -> None:
+    _, guide = begun(rounds=0, patience_s=5.0, again_after_s=2.0)
+    guide.reset(1.2, LIMITS)
+    stops, order = guide.plan.viewpoints, guide.plan.order
+    for stop in order[:-1]:
+        guide.reject(stops.position_m[stop], 0.0)
+        guide.reject(stops.position_m[stop], 0.0)
+    last_m = stops.position_m[order[-1]]
+    there = walking((last_m[:2], np.array([0.0, 0.0])))
+    aside_m, waited_s = last_m + [0.0, 1.0, 0.0], 0.0
+    while not guide.finished and waited_s < 60.0:
+        guide.select(among(there, waited_s, aside_m))
+        waited_s += 1.0 / guide.rate_hz
+    assert waited_s == pytest.approx(2 * 5.0 + 2.0, abs=1.0)
+    assert np.isinf(guide.visited_s[order[-1]])
+
+
 def test_what_is_flown_is_judged_with_the_hold_at_its_end() -> None:
     tracks = walking(([0.8, 3.5], [1.0, 0.0]))
     turns = give_way.turns_s(tracks, HALL.field)

@@ -80,6 +80,7 @@ class Inspect:
         rate_hz: of the choice of viewpoint and yaw.
         keep_m: of the body from predicted movers at a viewpoint; while one comes nearer, others are
             visited first, or the vehicle steps aside.
+        patience_s: longest wait for movers on the way to a viewpoint, in all, until it is put off.
         time_base_s: time limit = this ...
         time_per_viewpoint_s: ... plus this for each viewpoint ...
         time_per_path_spm: ... plus this for each metre of the tour.
@@ -116,6 +117,7 @@ class Inspect:
     rounds: int = 1
     rate_hz: float = 5.0
     keep_m: float = 0.5
+    patience_s: float = 20.0
     time_base_s: float = 120.0
     time_per_viewpoint_s: float = 8.0
     time_per_path_spm: float = 4.0
@@ -147,6 +149,7 @@ class Inspect:
             yaw_tolerance_deg=self.yaw_tolerance_deg,
             dwell_s=self.dwell_s,
             rate_hz=self.rate_hz,
+            patience_s=self.patience_s,
             time_base_s=self.time_base_s,
         )
         require_non_negative(
@@ -219,6 +222,7 @@ class Inspect:
             weights=self._weights(),
             rate_hz=self.rate_hz,
             keep_m=self.keep_m,
+            patience_s=self.patience_s,
         )
         self._time_limit_s = (
             self.time_base_s

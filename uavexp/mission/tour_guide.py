@@ -7,14 +7,17 @@ the most that is new, and a stop is left when no yaw there would see anything wo
 it is the planned one. After the last stop, more are made for what is still unseen [ours].
 
 Among movers, while one may come near the way to the next stop, or to the stop itself, the vehicle
-steps aside (`give_way`); when that takes long, one of the stops after it is visited first [ours].
+steps aside (`give_way`); when that takes long, one of the stops after it is visited first, and a stop
+that has been waited for in vain is put off like one that is blocked [ours].
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
+from functools import cache, partial
 
 import numpy as np
 
@@ -26,6 +29,8 @@ from uavexp.inspection.visibility import Camera, visible_cells
 from uavexp.mission.give_way import aside_m, room_along_m, rooms_m, turns_s
 from uavexp.mission.more_stops import live_grid, more_stops
 from uavexp.types import Bool, Float, Goal, Limits, Observation
+
+Free = Callable[[int], bool]  # whether no mover comes near on the way to a stop, or there
 
 ALTERNATIVES = 4  # so many of the next stops may be visited before one that has to wait
 
@@ -65,6 +70,7 @@ class TourGuide:
         weights: of cells for the choice of yaw.
         rate_hz: of choices.
         keep_m: of the body from predicted movers at a stop.
+        patience_s: longest wait for movers on the way to a stop, in all.
     """
 
     plan: InspectionPlan
@@ -81,11 +87,13 @@ class TourGuide:
     weights: Weights
     rate_hz: float
     keep_m: float
+    patience_s: float
     scanned: Bool = field(init=False, repr=False)  # (N,) cells believed to have been seen
     visited_s: Float = field(init=False, repr=False)  # (V,) of the planned stops; inf: never
     _stops: Viewpoints = field(init=False, repr=False)
     _state: list[Stop] = field(init=False, repr=False)
     _after_s: Float = field(init=False, repr=False)  # (S,) a stop put off is not tried before
+    _waited_s: Float = field(init=False, repr=False)  # (S,) for movers, since last put off
     _order: list[int] = field(init=False, repr=False)
     _blocked: Bool = field(init=False, repr=False)  # (V,) planned stops the live map has blocked
     _arrived_s: float = field(init=False, repr=False, default=math.inf)
@@ -124,16 +132,16 @@ class TourGuide:
         """
         if not fresh:
             self._scan(observation)
-        stop = self._next(observation)
-        if stop is not None and not fresh and self._is_done(stop, observation):
-            self._note_visit(stop, observation.time_s)
-            stop = self._next(observation)
+        free: Free = cache(partial(self._is_free, observation))
+        stop = self._next(observation, free)
+        if stop is not None and not fresh and not self._is_left(stop, observation, free):
+            stop = self._next(observation, free)
         if stop is None:
             return None
         looks = self.look is Look.ADAPTIVE or self._has_arrived(stop, observation)
         if not fresh:
             self._yaw_rad = self._wanted_yaw_rad(stop, observation) if looks else math.nan
-        place_m = self._place_m(stop, observation)
+        place_m = self._place_m(stop, observation, free)
         return Goal(
             position_m=place_m,
             is_target=True,
@@ -146,12 +154,13 @@ class TourGuide:
         self._stops, self._order = stops, order
         self._state = [Stop.OPEN] * len(stops)
         self._after_s = np.full(len(stops), -np.inf)
+        self._waited_s = np.zeros(len(stops))
         self._arrived_s, self._finished = math.inf, not order
 
     def _is_open(self, stop: int) -> bool:
         return self._state[stop] in (Stop.OPEN, Stop.PUT_OFF)
 
-    def _next(self, observation: Observation) -> int | None:
+    def _next(self, observation: Observation, free: Free) -> int | None:
         """The first stop of the order that can be tried now; makes more stops when all are done."""
         self._postpone_blocked(observation)
         left = [stop for stop in self._order if self._is_open(stop)]
@@ -159,18 +168,30 @@ class TourGuide:
             self._go_on(observation)
             left = self._order
         ready = [stop for stop in left if self._after_s[stop] <= observation.time_s]
-        if not ready or self._is_free(ready[0], observation):
+        if not ready or free(ready[0]):
             self._waiting_s = math.inf
             return next(iter(ready), None)
         self._waiting_s = min(self._waiting_s, observation.time_s)
         if observation.time_s - self._waiting_s < self.again_after_s:
             return ready[0]
-        free = next((s for s in ready[1:ALTERNATIVES] if self._is_free(s, observation)), ready[0])
-        self._order.remove(free)
-        self._order.insert(0, free)
-        return free
+        other = next((stop for stop in ready[1:ALTERNATIVES] if free(stop)), ready[0])
+        self._order.remove(other)
+        self._order.insert(0, other)
+        return other
 
-    def _is_free(self, stop: int, observation: Observation) -> bool:
+    def _is_left(self, stop: int, observation: Observation, free: Free) -> bool:
+        """Whether a stop still is to be gone to or stayed at, at the end of a period; else that is noted."""
+        if self._is_done(stop, observation):
+            self._note_visit(stop, observation.time_s)
+            return False
+        if not free(stop):
+            self._waited_s[stop] += 1.0 / self.rate_hz
+        if self._waited_s[stop] < self.patience_s:
+            return True
+        self._put_off(stop, observation.time_s)
+        return False
+
+    def _is_free(self, observation: Observation, stop: int) -> bool:
         """Whether no mover may come near on the way to a stop, as flown if that is under way, or there."""
         tracks, limits, goal = observation.tracks, self._limits, observation.goal
         if limits is None or not len(tracks):
@@ -187,10 +208,10 @@ class TourGuide:
             room_m = float(rooms_m(tracks, turn_s, here_m, place_m[None], limits, way=True)[0])
         return room_m >= limits.body_radius_m + self.keep_m
 
-    def _place_m(self, stop: int, observation: Observation) -> Float:
+    def _place_m(self, stop: int, observation: Observation, free: Free) -> Float:
         """Where to go for a stop: to it, or aside while movers come there."""
         limits = self._limits
-        if limits is None or self._is_free(stop, observation):
+        if limits is None or free(stop):
             return np.asarray(self._stops.position_m[stop])
         live, here_m = observation.field, observation.state.position_m
         keep_m = limits.body_radius_m + self.keep_m
@@ -213,7 +234,7 @@ class TourGuide:
     def _put_off(self, stop: int, time_s: float) -> None:
         again = self._state[stop] is Stop.PUT_OFF
         self._state[stop] = Stop.GIVEN_UP if again else Stop.PUT_OFF
-        self._after_s[stop] = time_s + self.again_after_s
+        self._after_s[stop], self._waited_s[stop] = time_s + self.again_after_s, 0.0
         self._order.remove(stop)
         self._order.append(stop)
         self._arrived_s = math.inf
