@@ -20,12 +20,12 @@ from tests.detections import (
     straight,
     unknown_map,
 )
-from tests.fields import box
+from tests.fields import box, field_from
 from tests.scans import take_scan
 from tests.triggers import LIMITS
 from uavexp.detection.clusters import cluster, split
 from uavexp.detection.returns import returns, without
-from uavexp.mapping.base import OCCUPIED
+from uavexp.mapping.base import OCCUPIED, DistanceField
 from uavexp.types import Bodies, Bool, Float, RayScan, Scan, Tracks
 
 ACROSS = straight((4.0, 1.2, 0.86), (0.0, 1.0, 0.0))
@@ -163,21 +163,63 @@ def test_two_that_pass_closely_stay_two() -> None:
     assert tracks.half_size_m[:, :2].max() < 0.6
 
 
+SCREEN = ((2.6, 2.4, 0.0), (2.7, 4.6, 2.9))  # hides x = 4 m from y = 2.3 m on
+
+
+def with_screen() -> DistanceField:
+    grid = room_map().state == OCCUPIED
+    box(grid, *SCREEN)
+    return field_from(grid, max_distance_m=2.0)
+
+
 def test_a_hidden_mover_coasts_and_is_forgotten_after_that() -> None:
-    made, field = detector(), room_map()
+    made, field = detector(coast_s=1.2), with_screen()
     for scan, bodies in scans([ACROSS], 1.5):
         _, tracks = made.detect(scan, field, bodies)
     velocity_mps, last_m = tracks.velocity_mps[0], tracks.position_m[0]
     lives = []
     for tick in range(1, 16):
-        scan = ray_scan([], 1.4 + 0.1 * tick)
-        _, tracks = made.detect(scan, field, bodies_at([], 0.0))
+        _, tracks = made.detect(ray_scan([SCREEN], 1.4 + 0.1 * tick), field, bodies_at([], 0.0))
         lives.append(len(tracks))
         if tick == 10:
             assert np.allclose(tracks.position_m[0], last_m + 1.0 * velocity_mps, atol=1e-9)
             assert tracks.covariance[0, 0, 0] > 0.05
     assert lives[:12] == [1] * 12
     assert lives[-1] == 0
+
+
+def test_a_mover_that_is_seen_to_be_gone_is_forgotten_at_once() -> None:
+    made, field = detector(), room_map()
+    for scan, bodies in scans([ACROSS], 1.5):
+        made.detect(scan, field, bodies)
+    lives = [len(made.detect(ray_scan([], 1.5 + 0.1 * n), field, bodies)[1]) for n in range(4)]
+    assert lives[0] == 1, "a scan may miss it"
+    assert lives[-1] == 0
+
+
+def test_a_mover_that_turns_back_while_it_is_missed_stays_itself() -> None:
+    def turns(time_s: float) -> Float:
+        return np.array([4.0, 1.2 + min(time_s, 3.2 - time_s), 0.86])
+
+    made, field, identities = detector(), room_map(), set()
+    blind = replace(ray_scan([]), range_m=np.full(len(ray_scan([]).range_m), np.nan, dtype=np.float32))
+    for scan, bodies in scans([turns], 2.4):
+        missed = 1.55 < scan.time_s < 2.0
+        seen = replace(blind, time_s=scan.time_s) if missed else scan
+        identities |= set(made.detect(seen, field, bodies)[1].identity.tolist())
+    assert len(identities) == 1
+
+
+def test_a_hidden_mover_does_not_walk_into_a_wall() -> None:
+    made, field = detector(), room_map()
+    for scan, bodies in scans([straight((4.0, 3.0, 0.86), (0.0, 1.0, 0.0))], 2.0):
+        made.detect(scan, field, bodies)
+    blind = np.full(len(scan.range_m), np.nan, dtype=np.float32)
+    for n in range(1, 20):
+        scan = replace(scan, time_s=2.0 + 0.1 * n, range_m=blind)
+        _, tracks = made.detect(scan, field, bodies)
+    assert tracks.position_m[0, 1] == pytest.approx(5.8 - HALF_M[1], abs=0.25)
+    assert tracks.velocity_mps[0, 1] > 0.5, "where it turned is not known"
 
 
 @pytest.mark.parametrize("option", ["sensed", "truth"])

@@ -110,7 +110,7 @@ def test_a_stop_at_which_somebody_stays_is_given_up_after_waiting_twice() -> Non
         guide.reject(stops.position_m[stop], 0.0)
     last_m = stops.position_m[order[-1]]
     there = walking((last_m[:2], np.array([0.0, 0.0])))
-    aside_m, waited_s = last_m + [0.0, 1.0, 0.0], 0.0
+    aside_m, waited_s = last_m + np.array([0.0, 1.0, 0.0]), 0.0
     while not guide.finished and waited_s < 60.0:
         guide.select(among(there, waited_s, aside_m))
         waited_s += 1.0 / guide.rate_hz

@@ -9,13 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.fields import empty, field_from
 from tests.logs import make_log
 from uavexp.bodies import ABSENT_M
 from uavexp.detection.clusters import Clusters
 from uavexp.detection.kalman import Estimate, Motion, MotionFilter, estimated
 from uavexp.detection.tracker import Tracker, TrackRule, centres_m
 from uavexp.metrics.tracking_movers import match, measures, near_misses, predicted_errors_m, quality
-from uavexp.types import Contact, Float, Shape, TrialLog
+from uavexp.types import Contact, Float, RayScan, Shape, TrialLog
 
 
 def still(times_s: Float) -> Float:
@@ -140,11 +141,21 @@ def test_a_body_half_hidden_stays_where_it_was_expected(hidden_m: float, expecte
     assert centres_m(seen, half, beyond, SENSOR_M)[0, 1] == pytest.approx(1.0), "what is seen lies within it"
 
 
+NOWHERE = field_from(empty((2.0, 2.0, 2.0)), max_distance_m=2.0)  # far from any obstacle
+BLIND = RayScan(  # sees nothing of what it does not cluster
+    time_s=0.0,
+    origin_m=SENSOR_M,
+    direction=np.zeros((0, 3), np.float32),
+    range_m=np.zeros(0, np.float32),
+    max_range_m=10.0,
+)
+
+
 def follow(tracker: Tracker, scans: list[Clusters], period_s: float = 0.1) -> list[int]:
     """Published identities after the last scan."""
     for scan in scans:
-        tracker.predict(period_s)
-        tracker.observe(scan, SENSOR_M, period_s)
+        tracker.predict(period_s, NOWHERE)
+        tracker.observe(scan, BLIND, period_s)
     return tracker.published(0.0).identity.tolist()
 
 

@@ -118,6 +118,10 @@ class MotionFilter:
         transition, noise = _step(round(period_s, 6))
         self._kalman.predict(F=transition, Q=density * noise)
 
+    def stay(self, position_m: Float) -> None:
+        """Be at a position (3,) after all, after `predict`."""
+        self._kalman.x[:3] = position_m
+
     def observe(self, position_m: Float) -> None:
         """Take in an observed centre (3,); not finite is no observation (filterpy would believe it)."""
         if not np.isfinite(position_m).all():

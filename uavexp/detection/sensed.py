@@ -12,7 +12,7 @@ seen is never taken for a mover. Such returns are clustered and tracked (`tracke
   map has had it for `memory_s`; when it walks off it is a new object that moves.
 - One slower than about `free_m` in the time the map needs for a surface (0.2 s at 10 Hz) and
   `memory_s` is carried by the map as a fixed obstacle, which follows it.
-- One that is hidden coasts at its last velocity for `coast_s`.
+- One that is hidden coasts at its last velocity for `coast_s`, as far as no obstacle is in its way.
 - A filter with a state that is not finite, or too fast or too uncertain to be true, is dropped
   and counted (`Tracks.dropped`).
 """
@@ -46,7 +46,7 @@ class Sensed:
     moved_m: float = 0.25
     standing_mps: float = 0.12
     standing_s: float = 1.0
-    coast_s: float = 1.2
+    coast_s: float = 3.0
     max_speed_mps: float = 6.0
     max_deviation_m: float = 2.0
     position_noise_m: float = 0.08
@@ -111,8 +111,8 @@ class Sensed:
         self._time_s = scan.time_s
         sensor_m = viewpoint_m(scan)
         clusters = cluster(points_m, sensor_m, self.cluster_m, self.min_points, self.max_size_m)
-        clusters = split(clusters, points_m, sensor_m, *self._tracker.predict(period_s))
-        moving = self._tracker.observe(clusters, sensor_m, period_s)
+        clusters = split(clusters, points_m, sensor_m, *self._tracker.predict(period_s, field))
+        moving = self._tracker.observe(clusters, scan, period_s)
         taken = np.append(moving, False)[clusters.label]
         return without(scan, seen.where[loose][taken]), self._tracker.published(scan.time_s)
 

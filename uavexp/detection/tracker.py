@@ -4,6 +4,11 @@ Association is global nearest neighbour: the assignment of least total Mahalanob
 squared, nothing beyond the gate (Bar-Shalom, Li and Kirubarajan 2001). What a track observes
 is the centre of its whole body, not of the part in sight (`centres_m`).
 
+A confirmed track that no cluster fits may have turned: what its speed would let it reach is its own
+if nobody else's. Else it is kept while its place is hidden, out of view or covered by something, and
+given up where the sensor sees through it. It does not walk on into an obstacle: it stays where it
+meets that, at the speed it had, for nobody knows where to it turned.
+
 A track is one of three things. New: it has not moved yet. A new object may just as well be a
 piece of the fixed world that the map got wrong, so its returns stay in the scan. Moving: it
 has been seen often enough and has left the place of its birth. Standing: it was moving and
@@ -19,9 +24,14 @@ import numpy as np
 
 from uavexp.detection.clusters import Clusters
 from uavexp.detection.kalman import Estimate, Motion, MotionFilter
-from uavexp.types import Bool, Float, Int, Tracks
+from uavexp.detection.returns import viewpoint_m
+from uavexp.detection.sight import seen_empty
+from uavexp.mapping.base import DistanceField
+from uavexp.types import Bool, Float, Int, Scan, Tracks
 
 _NEW_MISSES = 2  # a new track that misses more in a row is forgotten
+_EMPTY = 2  # a confirmed one that is seen to be gone more often in a row, too
+_NOISES = 3.0  # standard deviations of an observed centre that a turn is allowed besides
 _GROWTH = 0.4  # share of a greater size that is believed at once: it may be two bodies that meet
 _FAR = 1e6  # cost of a pair outside the gate
 
@@ -51,6 +61,7 @@ class Track:
     place_m: Float  # (3,) where it was born or last stood
     hits: int = 1
     misses: int = 0  # observations missed in a row
+    empty: int = 0  # of them, those that saw through its place
     unseen_s: float = 0.0
     still_s: float = 0.0
     moving: bool = False
@@ -59,6 +70,15 @@ class Track:
     def grow(self, half_m: Float) -> None:
         """Approach the largest size seen."""
         self.half_size_m = self.half_size_m + _GROWTH * np.maximum(half_m - self.half_size_m, 0.0)
+
+    def predict(self, period_s: float, field: DistanceField) -> None:
+        """Move on by a period > 0 s; one that is not in sight stays where it meets an obstacle."""
+        before_m = self.filter.position_m.copy()
+        self.filter.predict(period_s)
+        if self.unseen_s > 0.0:
+            free_m = field.distance_m(np.stack([before_m, self.filter.position_m]))
+            if free_m[1] < min(free_m[0], float(self.half_size_m[:2].min())):
+                self.filter.stay(before_m)
 
     def judge(self, rule: TrackRule, period_s: float) -> None:
         """Decide whether it moves, after an observation."""
@@ -80,41 +100,48 @@ class Tracker:
     dropped: int = 0
     _born: int = 0
 
-    def predict(self, period_s: float) -> tuple[Float, Float]:
+    def predict(self, period_s: float, field: DistanceField) -> tuple[Float, Float]:
         """Move all tracks on by a period >= 0 s; returns both corners (M, 3) of where movers are expected."""
         for track in self.tracks if period_s > 0.0 else ():
-            track.filter.predict(period_s)
+            track.predict(period_s, field)
         known = [track for track in self.tracks if track.confirmed]
         centre = np.array([track.filter.position_m for track in known]).reshape(-1, 3)
         half_m = np.array([track.half_size_m for track in known]).reshape(-1, 3)
         return centre - half_m, centre + half_m
 
-    def observe(self, clusters: Clusters, viewpoint_m: Float, period_s: float) -> Bool:
+    def observe(self, clusters: Clusters, scan: Scan, period_s: float) -> Bool:
         """Take in one scan's clusters, after `predict`.
 
         Args:
             clusters: what is where the map says free.
-            viewpoint_m: (3,) of the sensor.
+            scan: in which they were found.
             period_s: since the last scan; 0 at the first.
 
         Returns:
             Whether each cluster (K,) belongs to a mover.
         """
-        half_m = half_sizes_m(clusters)
-        owner, observed_m = self._associate(clusters, half_m, viewpoint_m)
-        for index, track in enumerate(self.tracks):
-            k = observed_m.get(index)
-            if k is None:
-                track.misses, track.unseen_s = track.misses + 1, track.unseen_s + period_s
-                continue
-            track.grow(half_m[k[0]])
-            track.filter.observe(k[1])
-            track.hits, track.misses, track.unseen_s = track.hits + 1, 0, 0.0
+        half_m, sensor_m = half_sizes_m(clusters), viewpoint_m(scan)
+        owner, observed_m = self._associate(clusters, half_m, sensor_m, period_s)
+        self._miss([track for n, track in enumerate(self.tracks) if n not in observed_m], scan, period_s)
+        for index, (k, centre_m) in observed_m.items():
+            track = self.tracks[index]
+            track.grow(half_m[k])
+            track.filter.observe(centre_m)
+            track.hits, track.misses, track.empty, track.unseen_s = track.hits + 1, 0, 0, 0.0
             track.judge(self.rule, period_s)
         moving = np.array([track.moving for track in self.tracks] + [False])[owner]
-        self._bear(clusters, half_m, np.flatnonzero(owner < 0), viewpoint_m)
+        self._bear(clusters, half_m, np.flatnonzero(owner < 0), sensor_m)
         self._bury()
         return moving
+
+    @staticmethod
+    def _miss(tracks: list[Track], scan: Scan, period_s: float) -> None:
+        """Note that these were not observed."""
+        centre_m = np.array([track.filter.position_m for track in tracks]).reshape(-1, 3)
+        half_m = np.array([track.half_size_m for track in tracks]).reshape(-1, 3)
+        for track, empty in zip(tracks, seen_empty(scan, centre_m, half_m), strict=True):
+            track.misses, track.unseen_s = track.misses + 1, track.unseen_s + period_s
+            track.empty = track.empty + 1 if empty else 0
 
     def published(self, time_s: float) -> Tracks:
         """The movers that are believed to be there."""
@@ -135,7 +162,7 @@ class Tracker:
         )
 
     def _associate(
-        self, clusters: Clusters, half_m: Float, viewpoint_m: Float
+        self, clusters: Clusters, half_m: Float, sensor_m: Float, period_s: float
     ) -> tuple[Int, dict[int, tuple[int, Float]]]:
         """Index of the track that each cluster (K,) belongs to, -1: to none; each track's cluster and centre.
 
@@ -148,11 +175,14 @@ class Tracker:
 
         predicted_m = np.stack([track.filter.position_m for track in self.tracks])[:, None]
         known_m = np.stack([track.half_size_m for track in self.tracks])[:, None]
-        seen_m = centres_m(clusters, np.maximum(known_m, half_m), predicted_m, viewpoint_m)  # (T, K, 3)
+        seen_m = centres_m(clusters, np.maximum(known_m, half_m), predicted_m, sensor_m)  # (T, K, 3)
         apart_m = seen_m - predicted_m
         gates = np.linalg.inv(np.stack([track.filter.innovation_covariance for track in self.tracks]))
         squared = ((apart_m @ gates) * apart_m).sum(axis=2)
-        cost = np.where(squared <= self.rule.gate**2, squared, _FAR)
+        turned_m = self._turned_m(period_s)[:, None]
+        reached = np.linalg.norm(apart_m, axis=2) <= turned_m
+        cost = np.where(reached, self.rule.gate**2 + squared, _FAR)
+        cost = np.where(squared <= self.rule.gate**2, squared, cost)
         row, column = linear_sum_assignment(cost)
         pairs = [(int(t), int(k)) for t, k in zip(row, column, strict=True) if cost[t, k] < _FAR]
         for t, k in pairs:
@@ -163,10 +193,20 @@ class Tracker:
         owner[more] = np.argmax(inside[:, more], axis=0)
         return owner, {t: (k, seen_m[t, k]) for t, k in pairs}
 
-    def _bear(self, clusters: Clusters, half_m: Float, new: Int, viewpoint_m: Float) -> None:
+    def _turned_m(self, period_s: float) -> Float:
+        """How far (T,) from its prediction each track may be if it turned since it was seen; new: 0."""
+        noise_m = _NOISES * self.rule.motion.position_noise_m
+        return np.array([
+            2.0 * float(np.linalg.norm(track.filter.velocity_mps)) * (track.unseen_s + period_s) + noise_m
+            if track.confirmed
+            else 0.0
+            for track in self.tracks
+        ])  # fmt: skip
+
+    def _bear(self, clusters: Clusters, half_m: Float, new: Int, sensor_m: Float) -> None:
         """Begin a track at each of these clusters."""
         nothing = np.full((len(clusters), 3), np.nan)
-        centre_m = centres_m(clusters, half_m, nothing, viewpoint_m)
+        centre_m = centres_m(clusters, half_m, nothing, sensor_m)
         for k in new:
             filter_ = MotionFilter(centre_m[k], self.rule.motion)
             self.tracks.append(Track(self._born, filter_, half_m[k], centre_m[k]))
@@ -178,7 +218,7 @@ class Tracker:
         self.tracks = [
             track
             for track in self.tracks
-            if track.misses <= (track.hits if track.confirmed else _NEW_MISSES)
+            if (track.empty <= _EMPTY if track.confirmed else track.misses <= _NEW_MISSES)
             and track.unseen_s <= rule.coast_s
         ]
         sound = [
