@@ -11,6 +11,7 @@ from tests.inspections import START_M, building
 from tests.unit.test_inspect_mission import begun, seen_at, state
 from tests.unit.test_trigger import LIMITS
 from uavexp.mission import give_way
+from uavexp.planner.moving import turns_s
 from uavexp.types import Float, Observation, Tracks, Trajectory
 
 HALL = building()  # 6 m by 4 m, a partition at x = 3 m for y < 2.6 m
@@ -32,13 +33,13 @@ def walking(*movers: tuple[Float, Float]) -> Tracks:
 
 
 def room_m(tracks: Tracks, place_m: Float, from_m: Float, *, way: bool = False) -> float:
-    turns = give_way.turns_s(tracks, HALL.field)
+    turns = turns_s(tracks, HALL.field, give_way.HORIZON_S)
     return float(give_way.rooms_m(tracks, turns, from_m, place_m[None], LIMITS, way)[0])
 
 
 def test_a_mover_turns_where_its_way_meets_a_wall() -> None:
     tracks = walking(([1.5, 2.0], [1.0, 0.0]), ([1.5, 2.0], [0.0, 0.3]), ([0.45, 2.0], [0.5, 0.0]))
-    turns = give_way.turns_s(tracks, HALL.field)
+    turns = turns_s(tracks, HALL.field, give_way.HORIZON_S)
     # the partition's face at x = 3 m, less the body's half width and the margin, 1.1 m away
     assert turns[0] == pytest.approx(1.1, abs=give_way.STEP_S + 0.06)
     assert np.isinf(turns[1:]).all()  # the second comes to none, the third walks away from one
@@ -59,7 +60,7 @@ def test_a_place_that_is_reached_only_after_the_horizon_counts_as_free() -> None
 def test_behind_the_turn_a_mover_may_be_anywhere_its_speed_takes_it() -> None:
     tracks = walking(([2.3, 1.0], [1.0, 0.0]))
     behind = np.array([1.2, 1.0, 1.2])
-    turn_s = give_way.turns_s(tracks, HALL.field)[0]
+    turn_s = turns_s(tracks, HALL.field, give_way.HORIZON_S)[0]
     straight = give_way.rooms_m(tracks, np.array([np.inf]), behind, behind[None], LIMITS, way=False)[0]
     assert straight == pytest.approx(2.3 - 1.2 - HALF_M[0], abs=0.01)  # it only goes away
     left_s = give_way.HORIZON_S - turn_s
@@ -120,7 +121,7 @@ def test_a_stop_at_which_somebody_stays_is_given_up_after_waiting_twice() -> Non
 
 def test_what_is_flown_is_judged_with_the_hold_at_its_end() -> None:
     tracks = walking(([0.8, 3.5], [1.0, 0.0]))
-    turns = give_way.turns_s(tracks, HALL.field)
+    turns = turns_s(tracks, HALL.field, give_way.HORIZON_S)
     for y_m in (3.5, 2.5, 1.0):
         place = np.array([2.0, y_m, 1.2])
         hold = Trajectory(breaks_s=np.array([0.0, 0.3]), coefficients=place[None, None], at_rest=True)

@@ -35,7 +35,7 @@ def tracks(*movers: tuple[Any, Any, Any], sigma_m: float = 0.0, sigma_mps: float
     )
 
 
-def obstacles(found: Tracks, **changes: float) -> MovingObstacles:
+def obstacles(found: Tracks, **changes: Any) -> MovingObstacles:
     return MovingObstacles(
         **({"tracks": found, "body_radius_m": 0.2, "margin_m": 0.3, "horizon_s": 2.0} | changes)
     )
@@ -43,6 +43,24 @@ def obstacles(found: Tracks, **changes: float) -> MovingObstacles:
 
 PERSON = (0.3, 0.3, 0.9)
 coordinate = st.floats(-3.0, 3.0)
+
+
+def test_before_a_wall_a_mover_stays_and_grows_by_what_its_speed_allows() -> None:
+    """At 1 m/s from x = 1 its side, 0.3 m on, is 0.15 m before the wall at x = 3 after 1.55 s."""
+    grid = empty((6.0, 4.0, 3.0))
+    box(grid, (3.0, 0.0, 0.0), (3.2, 4.0, 3.0))
+    found = tracks(((1.0, 2.0, 1.0), (1.0, 0.0, 0.0), PERSON))
+    moving = obstacles(found, field=field_from(grid, max_distance_m=2.0), horizon_s=5.0)
+    turn_s = moving.table(NOW_S)[0, 15]
+    assert turn_s == pytest.approx(1.55, abs=0.15)
+    beside_m, ahead_s = np.array([[1.0, 0.0, 1.0]]), np.array([1.0, turn_s, turn_s + 0.4, turn_s + 2.0])
+    rooms_m = moving.clearance_m(np.tile(beside_m, (4, 1)), NOW_S + ahead_s)
+    straight = obstacles(found, horizon_s=5.0).clearance_m(np.tile(beside_m, (4, 1)), NOW_S + ahead_s)
+    assert np.allclose(rooms_m[:2], straight[:2]), "until then as without the wall"
+    assert rooms_m[2] == pytest.approx(rooms_m[1] - 0.4), "then it may come nearer at 1 m/s"
+    assert rooms_m[3] == pytest.approx(rooms_m[1] - 0.6), "up to a cap"
+    later = moving.table(NOW_S + turn_s + 0.4)[0]
+    assert clearance_after(later[None], *beside_m[0], 0.0) == pytest.approx(rooms_m[2])
 
 
 @settings(deadline=None)

@@ -13,27 +13,16 @@ import numpy as np
 
 from uavexp.geometry import evaluate
 from uavexp.mapping.base import DistanceField
-from uavexp.planner.moving import box_gap
+from uavexp.planner.moving import box_gap, turns_s
 from uavexp.types import Bool, Float, Limits, Tracks, Trajectory
 
 HORIZON_S = 1.8  # predictions count for so long
 STEP_S = 0.1
 _SPREAD_MPS = 0.1  # by which a mover grows even where nothing is in its way
-_TURN_M = 0.15  # an obstacle so near to a mover's side makes it turn
 _ASIDE_M = 2.5  # a step aside goes no farther
 _FAR_WORTH = 0.05  # m of room that a metre of way must bring
 _ENOUGH_M = 0.3  # room beyond what must be kept is worth nothing
 _ALONG = 6  # samples of the way to a place, for its clearance
-
-
-def turns_s(tracks: Tracks, field: DistanceField) -> Float:
-    """Time (B,) until each mover comes to a mapped obstacle; inf: not within the horizon."""
-    ahead_s = np.arange(0.0, HORIZON_S + STEP_S, STEP_S)
-    places_m = tracks.predicted_m(tracks.time_s + ahead_s)
-    free_m = field.distance_m(places_m.reshape(-1, 3)).reshape(places_m.shape[:2])
-    near = free_m[:, 1:] < tracks.half_size_m[:, :1] + _TURN_M
-    coming = near & (np.diff(free_m, axis=1) < -0.1 * STEP_S)  # not what it is walking away from
-    return np.where(coming.any(axis=1), ahead_s[1:][np.argmax(coming, axis=1)], np.inf)
 
 
 def rooms_m(tracks: Tracks, turn_s: Float, from_m: Float, place_m: Float, limits: Limits, way: bool) -> Float:
@@ -41,7 +30,7 @@ def rooms_m(tracks: Tracks, turn_s: Float, from_m: Float, place_m: Float, limits
 
     Args:
         tracks: the movers.
-        turn_s: (B,) of `turns_s`.
+        turn_s: (B,) of `moving.turns_s`.
         from_m: (3,) where the vehicle is.
         place_m: (N, 3) where it goes and stays.
         limits: of the vehicle.
@@ -81,7 +70,7 @@ def aside_m(
     away_m = np.linalg.norm(places_m - from_m, axis=1)
     near_m = np.concatenate([from_m[None], places_m[away_m <= _ASIDE_M]])
     near_m = near_m[_straight(field, from_m, near_m, limits.body_radius_m)]
-    turn_s, worth = turns_s(tracks, field), -_FAR_WORTH * np.linalg.norm(near_m - from_m, axis=1)
+    turn_s, worth = turns_s(tracks, field, HORIZON_S), -_FAR_WORTH * np.linalg.norm(near_m - from_m, axis=1)
     for way in (True, False):  # both: where the way begins too near already, the stay still decides
         worth += np.minimum(rooms_m(tracks, turn_s, from_m, near_m, limits, way), keep_m + _ENOUGH_M)
     return np.asarray(near_m[int(np.argmax(worth))])

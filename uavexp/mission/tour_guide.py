@@ -26,8 +26,9 @@ from uavexp.inspection.plan import InspectionPlan, Settings, adapt_order
 from uavexp.inspection.view_angle import Weights, cell_weights, choose_yaw
 from uavexp.inspection.viewpoints import Viewpoints
 from uavexp.inspection.visibility import Camera, visible_cells
-from uavexp.mission.give_way import aside_m, room_along_m, rooms_m, turns_s
+from uavexp.mission.give_way import HORIZON_S, aside_m, room_along_m, rooms_m
 from uavexp.mission.more_stops import live_grid, more_stops
+from uavexp.planner.moving import turns_s
 from uavexp.types import Bool, Float, Goal, Limits, Observation
 
 Free = Callable[[int], bool]  # whether no mover comes near on the way to a stop, or there
@@ -197,7 +198,7 @@ class TourGuide:
         if limits is None or not len(tracks):
             return True
         place_m, here_m = self._stops.position_m[stop], observation.state.position_m
-        turn_s = turns_s(tracks, observation.field)
+        turn_s = turns_s(tracks, observation.field, HORIZON_S)
         if (
             observation.trajectory is not None
             and goal is not None

@@ -49,7 +49,11 @@ def plan_among(
         known_only: whether unknown space is closed.
     """
     moving = MovingObstacles(
-        tracks=request.tracks, body_radius_m=limits.body_radius_m, margin_m=margin_m, horizon_s=horizon_s
+        tracks=request.tracks,
+        field=request.field,
+        body_radius_m=limits.body_radius_m,
+        margin_m=margin_m,
+        horizon_s=horizon_s,
     )
     if not len(moving) or horizon_s <= 0.0:
         return plan(request)

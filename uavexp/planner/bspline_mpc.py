@@ -188,6 +188,7 @@ class BsplineMpc:
             raise RuntimeError("plan() needs reset() first")
         return MovingObstacles(
             tracks=request.tracks if self.mover_horizon_s > 0.0 else Tracks.none(request.time_s),
+            field=request.field,
             body_radius_m=self._follower.static.settings.limits.body_radius_m,
             margin_m=margin_m,
             horizon_s=self.mover_horizon_s,

@@ -1,10 +1,12 @@
 """Moving obstacles for planners: each predicted body is an obstacle at its own time only.
 
 A mover is the upright box around it, carried along at constant velocity and grown by the
-uncertainty of its centre, k sigma up to a cap. What a plan must keep from it is the body's
-radius and a margin, for all times within the horizon; beyond that a prediction says
-nothing, and nothing is asked. Any planner can use it: `clearance_m` judges a timed curve,
-`stamped` writes the movers into a copy of the map for searches that know no time.
+uncertainty of its centre, k sigma up to a cap. Where that leads into a mapped obstacle it will
+turn, and nobody knows where to: from then on it stays there and grows at its speed, up to another
+cap. What a plan must keep from it is the body's radius and a margin, for all times within the
+horizon; beyond that a prediction says nothing, and nothing is asked. Any planner can use it:
+`clearance_m` judges a timed curve, `stamped` writes the movers into a copy of the map for searches
+that know no time.
 """
 
 from __future__ import annotations
@@ -19,11 +21,14 @@ from uavexp.errors import require_non_negative
 from uavexp.mapping.base import DistanceField
 from uavexp.types import Float, Float32, PlanRequest, Tracks
 
-COLUMNS = 15  # of a mover's row: position 3, velocity 3, half size 3, variance 3, inset, cap, horizon
-_INSET, _CAP, _HORIZON = 12, 13, 14
+COLUMNS = 17  # of a row: position 3, velocity 3, half size 3, variance 3, inset, cap, horizon, turn, speed
+_INSET, _CAP, _HORIZON, _TURN, _SPEED = 12, 13, 14, 15, 16
 _LEAST_M = 0.05  # a stamped cell is closed, but no place that nothing can leave
 _SIGMAS = 1.0  # k
 _CAP_M = 0.3  # of the growth
+_TURN_CAP_M = 0.6  # of the growth after a turn
+_TURN_M = 0.15  # an obstacle so near to a mover's side makes it turn
+_TURN_STEP_S = 0.1
 
 
 @nb.njit(cache=True, inline="always")
@@ -32,6 +37,20 @@ def box_gap(half_x: float, half_y: float, half_z: float, x: float, y: float, z: 
     qx, qy, qz = abs(x) - half_x, abs(y) - half_y, abs(z) - half_z
     outside = math.sqrt(max(qx, 0.0) ** 2 + max(qy, 0.0) ** 2 + max(qz, 0.0) ** 2)
     return float(outside + min(max(qx, max(qy, qz)), 0.0))
+
+
+@nb.njit(cache=True, inline="always")
+def moved_s(row: Float, ahead_s: float) -> float:
+    """For how long a mover has moved on after a time: until it turned."""
+    return float(min(ahead_s, max(row[_TURN], 0.0)))
+
+
+@nb.njit(cache=True, inline="always")
+def grown_m(row: Float, ahead_s: float) -> float:
+    """By how much a mover's box has grown after a time."""
+    variance = row[9] + ahead_s * (row[10] + ahead_s * row[11])
+    turned = min(row[_SPEED] * max(ahead_s - row[_TURN], 0.0), _TURN_CAP_M)
+    return float(min(math.sqrt(max(variance, 0.0)), row[_CAP]) + turned)
 
 
 @nb.njit(cache=True)
@@ -50,13 +69,12 @@ def clearance_after(movers: Float, x: float, y: float, z: float, ahead_s: float)
         row = movers[b]
         if ahead_s > row[_HORIZON]:
             continue
+        on_s = moved_s(row, ahead_s)
         gap = box_gap(
             row[6], row[7], row[8],
-            x - row[0] - ahead_s * row[3], y - row[1] - ahead_s * row[4], z - row[2] - ahead_s * row[5],
+            x - row[0] - on_s * row[3], y - row[1] - on_s * row[4], z - row[2] - on_s * row[5],
         )  # fmt: skip
-        variance = row[9] + ahead_s * (row[10] + ahead_s * row[11])
-        growth = min(math.sqrt(max(variance, 0.0)), row[_CAP])
-        least = min(least, gap - growth - row[_INSET])
+        least = min(least, gap - grown_m(row, ahead_s) - row[_INSET])
     return float(least)
 
 
@@ -102,6 +120,16 @@ def _stamp(
                 distance[i, j, k] = min(distance[i, j, k], max(clearance, floor_m))
 
 
+def turns_s(tracks: Tracks, field: DistanceField, horizon_s: float) -> Float:
+    """Time (B,) until each mover comes to a mapped obstacle, s; inf: not within the horizon."""
+    ahead_s = _TURN_STEP_S * np.arange(max(math.ceil(horizon_s / _TURN_STEP_S), 1) + 1)
+    places_m = tracks.predicted_m(tracks.time_s + ahead_s)
+    free_m = field.distance_m(places_m.reshape(-1, 3)).reshape(places_m.shape[:2])
+    near = free_m[:, 1:] < tracks.half_size_m[:, :1] + _TURN_M
+    coming = near & (np.diff(free_m, axis=1) < -0.1 * _TURN_STEP_S)  # not what it is walking away from
+    return np.where(coming.any(axis=1), ahead_s[1:][np.argmax(coming, axis=1)], np.inf)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MovingObstacles:
     """The movers that a plan must keep away from, and by how much."""
@@ -110,6 +138,7 @@ class MovingObstacles:
     body_radius_m: float
     margin_m: float
     horizon_s: float  # predictions count for so long after the tracks' time
+    field: DistanceField | None = None  # of what they turn at; None: of nothing
 
     def __post_init__(self) -> None:
         require_non_negative(
@@ -123,7 +152,10 @@ class MovingObstacles:
         """Rows (B, COLUMNS) for kernels, with times counted from this absolute time."""
         tracks, ahead_s = self.tracks, from_s - self.tracks.time_s
         rows = np.empty((len(tracks), COLUMNS))
-        rows[:, 0:3] = tracks.position_m + ahead_s * tracks.velocity_mps
+        turn_s = np.full(len(tracks), np.inf)
+        if self.field is not None:
+            turn_s = turns_s(tracks, self.field, self.horizon_s)
+        rows[:, 0:3] = tracks.position_m + np.minimum(ahead_s, turn_s)[:, None] * tracks.velocity_mps
         rows[:, 3:6], rows[:, 6:9] = tracks.velocity_mps, tracks.half_size_m
         diagonal = np.einsum("nii->ni", tracks.covariance)
         mixed = np.einsum("nii->ni", tracks.covariance[:, :3, 3:])
@@ -135,7 +167,8 @@ class MovingObstacles:
         rows[:, 9] = place + ahead_s * (both + ahead_s * speed)
         rows[:, 10], rows[:, 11] = both + 2.0 * ahead_s * speed, speed
         rows[:, _INSET], rows[:, _CAP] = self.body_radius_m + self.margin_m, _CAP_M
-        rows[:, _HORIZON] = self.horizon_s - ahead_s
+        rows[:, _HORIZON], rows[:, _TURN] = self.horizon_s - ahead_s, turn_s - ahead_s
+        rows[:, _SPEED] = np.linalg.norm(tracks.velocity_mps, axis=1)
         return rows
 
     def clearance_m(self, points_m: Float, times_s: Float) -> Float:
@@ -179,7 +212,7 @@ class MovingObstacles:
         pace = np.array([np.linalg.norm(request.velocity_mps), speed_mps, acceleration_mps2])
         for row in table:
             ends_m = row[:3] + np.array([[0.0], [max(row[_HORIZON], 0.0)]]) * row[3:6]
-            reach_m = row[6:9] + row[_INSET] + row[_CAP] + safe_m - least_m
+            reach_m = row[6:9] + row[_INSET] + row[_CAP] + _TURN_CAP_M + safe_m - least_m
             low_m, high_m = ends_m.min(axis=0) - reach_m, ends_m.max(axis=0) + reach_m
             _stamp(
                 distance, field.origin_m, field.voxel_size_m, row[None], low_m, high_m,

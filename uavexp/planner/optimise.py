@@ -321,6 +321,7 @@ def moving_obstacles(request: PlanRequest, settings: Settings) -> MovingObstacle
     """The believed movers with what these settings keep from them; none when they do not count at all."""
     return MovingObstacles(
         tracks=request.tracks if settings.mover_horizon > 0.0 else Tracks.none(request.time_s),
+        field=request.field,
         body_radius_m=settings.body_radius,
         margin_m=settings.mover_margin,
         horizon_s=settings.mover_horizon,

@@ -16,6 +16,7 @@ import numba as nb
 import numpy as np
 
 from uavexp.mapping.field import value_and_gradient
+from uavexp.planner.moving import grown_m, moved_s
 from uavexp.types import Float, Float32, Int
 
 _AROUND_M = 0.25  # how far to the sides the static field is asked
@@ -76,9 +77,8 @@ def mover_planes(points: Float, velocities: Float, ahead_s: Float, movers: Float
         for row in movers:
             if ahead_s[k] > row[14]:
                 continue
-            centre, half = row[0:3] + ahead_s[k] * row[3:6], row[6:9]
-            variance = row[9] + ahead_s[k] * (row[10] + ahead_s[k] * row[11])
-            kept = row[12] + min(math.sqrt(max(variance, 0.0)), row[13])
+            centre, half = row[0:3] + moved_s(row, ahead_s[k]) * row[3:6], row[6:9]
+            kept = row[12] + grown_m(row, ahead_s[k])
             apart = points[k] - centre
             unit = facing(apart, velocities[k] - row[3:6], half, kept)
             support = (np.abs(unit) * half).sum() + kept
