@@ -84,6 +84,27 @@ def among(tracks: Tracks, time_s: float, here_m: Float) -> Observation:
     return replace(seen_at(time_s, state(here_m)), tracks=replace(tracks, time_s=time_s))
 
 
+def test_a_step_aside_that_is_under_way_is_not_changed_for_one_hardly_better() -> None:
+    tracks, here = walking(([1.0, 2.0], [0.8, 0.0])), np.array([2.2, 2.0, 1.2])
+    sides = np.array([[2.2, 3.2, 1.2], [2.2, 0.82, 1.2]])
+    chosen = [
+        give_way.aside_m(tracks, HALL.field, here, sides, KEEP_M, LIMITS, under_way).round(2).tolist()
+        for under_way in (None, *sides)
+    ]
+    assert chosen[1:] == sides.tolist()
+    assert chosen[0] in sides.tolist()
+
+
+def test_over_the_head_of_who_comes_is_a_place_to_step_aside_to() -> None:
+    _, guide = begun(rounds=0)
+    corner = np.array([0.45, 0.45, 1.2])
+    tracks = walking(([1.2, 1.2], [-0.6, -0.6]))
+    places = guide._refuges_m(among(tracks, 0.0, corner))
+    cornered = places[(np.abs(places[:, :2] - corner[:2]) < 0.4).all(axis=1)]
+    aside = give_way.aside_m(tracks, HALL.field, corner, cornered, KEEP_M, LIMITS)
+    assert aside[2] == pytest.approx(HALL.flight_bounds_m[1, 2])
+
+
 def test_a_stop_to_which_somebody_comes_waits_and_then_others_come_first() -> None:
     _, guide = begun(rounds=0)
     guide.reset(1.2, LIMITS)

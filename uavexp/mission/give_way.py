@@ -22,6 +22,8 @@ _SPREAD_MPS = 0.1  # by which a mover grows even where nothing is in its way
 _ASIDE_M = 2.5  # a step aside goes no farther
 _FAR_WORTH = 0.05  # m of room that a metre of way must bring
 _ENOUGH_M = 0.3  # room beyond what must be kept is worth nothing
+_SAME_M = 0.25  # places so near to each other are one
+_HELD_WORTH_M = 0.15  # of room that another place must bring to be worth a change of mind
 _ALONG = 6  # samples of the way to a place, for its clearance
 
 
@@ -55,7 +57,13 @@ def _rows(tracks: Tracks, turn_s: Float) -> Float:
 
 
 def aside_m(
-    tracks: Tracks, field: DistanceField, from_m: Float, places_m: Float, keep_m: float, limits: Limits
+    tracks: Tracks,
+    field: DistanceField,
+    from_m: Float,
+    places_m: Float,
+    keep_m: float,
+    limits: Limits,
+    under_way_m: Float | None = None,
 ) -> Float:
     """The place (3,) to go to, or to stay at, that leaves the movers the most room.
 
@@ -66,6 +74,7 @@ def aside_m(
         places_m: (N, 3) that may be gone to.
         keep_m: room that is wanted.
         limits: of the vehicle.
+        under_way_m: (3,) the place chosen last, which is not left for one that is hardly better.
     """
     away_m = np.linalg.norm(places_m - from_m, axis=1)
     near_m = np.concatenate([from_m[None], places_m[away_m <= _ASIDE_M]])
@@ -73,6 +82,8 @@ def aside_m(
     turn_s, worth = turns_s(tracks, field, HORIZON_S), -_FAR_WORTH * np.linalg.norm(near_m - from_m, axis=1)
     for way in (True, False):  # both: where the way begins too near already, the stay still decides
         worth += np.minimum(rooms_m(tracks, turn_s, from_m, near_m, limits, way), keep_m + _ENOUGH_M)
+    if under_way_m is not None:
+        worth[np.linalg.norm(near_m - under_way_m, axis=1) < _SAME_M] += _HELD_WORTH_M
     return np.asarray(near_m[int(np.argmax(worth))])
 
 

@@ -214,9 +214,22 @@ class TourGuide:
         limits = self._limits
         if limits is None or free(stop):
             return np.asarray(self._stops.position_m[stop])
-        live, here_m = observation.field, observation.state.position_m
-        keep_m = limits.body_radius_m + self.keep_m
-        return aside_m(observation.tracks, live, here_m, self.plan.lattice.position_m, keep_m, limits)
+        return aside_m(
+            observation.tracks,
+            observation.field,
+            observation.state.position_m,
+            self._refuges_m(observation),
+            limits.body_radius_m + self.keep_m,
+            limits,
+            None if observation.goal is None else observation.goal.position_m,
+        )
+
+    def _refuges_m(self, observation: Observation) -> Float:
+        """Places (N, 3) to step aside to: the plan's, and as high as may be flown, over those who walk."""
+        places_m = self.plan.lattice.position_m
+        high_m = places_m[places_m[:, 2] == places_m[:, 2].max()].copy()
+        high_m[:, 2] = observation.flight_bounds_m[1, 2]
+        return np.concatenate([places_m, high_m])
 
     def _postpone_blocked(self, observation: Observation) -> None:
         """Put off the stops at the head of the order on which the live map shows an obstacle."""

@@ -122,7 +122,7 @@ def _stamp(
 
 def turns_s(tracks: Tracks, field: DistanceField, horizon_s: float) -> Float:
     """Time (B,) until each mover comes to a mapped obstacle, s; inf: not within the horizon."""
-    ahead_s = _TURN_STEP_S * np.arange(max(math.ceil(horizon_s / _TURN_STEP_S), 1) + 1)
+    ahead_s: Float = _TURN_STEP_S * np.arange(max(math.ceil(horizon_s / _TURN_STEP_S), 1) + 1.0)
     places_m = tracks.predicted_m(tracks.time_s + ahead_s)
     free_m = field.distance_m(places_m.reshape(-1, 3)).reshape(places_m.shape[:2])
     near = free_m[:, 1:] < tracks.half_size_m[:, :1] + _TURN_M
