@@ -512,6 +512,8 @@ class TrialLog:
     cell_visible: Bool = field(
         default_factory=lambda: np.zeros(0, dtype=np.bool_)
     )  # (C,) from anywhere allowed
+    true_cell_seen_s: Float = field(default_factory=lambda: np.zeros(0))  # (U,) the same of the true surface
+    true_cell_visible: Bool = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))  # (U,)
     viewpoint_m: Float = field(default_factory=lambda: np.zeros((0, 3)))  # (V, 3) in the order planned
     viewpoint_yaw_rad: Float = field(default_factory=lambda: np.zeros(0))  # (V,)
     viewpoint_segment: Int = field(default_factory=lambda: np.zeros(0, dtype=np.int64))  # (V,)

@@ -10,8 +10,9 @@ import pytest
 
 from tests.inspections import START_M, boxes, building, surface_in
 from tests.logs import make_log, make_world
-from uavexp.inspection.reference import Surface
+from uavexp.inspection.reference import Surface, reference_field
 from uavexp.inspection.visibility import Camera
+from uavexp.mapping.base import DistanceField
 from uavexp.metrics import coverage as figures
 from uavexp.mission.coverage import Coverage, is_met, visible_anywhere
 from uavexp.scene import Scene
@@ -79,6 +80,10 @@ def test_only_what_is_framed_counts_and_the_first_time_stays(scene: Scene) -> No
     assert (seen.seen_s == 3.0).any()
 
 
+def true_field(world: World) -> DistanceField:
+    return reference_field(world.vertices_m, world.triangles, world.bounds_m)
+
+
 def test_all_of_an_empty_hall_is_visible_and_nothing_that_is_gone() -> None:
     hall = building()
     world = replace(
@@ -91,10 +96,10 @@ def test_all_of_an_empty_hall_is_visible_and_nothing_that_is_gone() -> None:
     )
     surface = surface_in(hall)
     walls = surface.part(np.abs(surface.normal[:, 2]) < 0.5)
-    visible = visible_anywhere(world, Scene(world), Camera(), walls, 0.45, 0.15)
+    visible = visible_anywhere(true_field(world), world, Scene(world), Camera(), walls, 0.45, 0.15)
     assert visible.mean() > 0.97
     without = replace(world, triangles=world.triangles[: 6 * 12])  # less the partition
-    after = visible_anywhere(without, Scene(without), Camera(), walls, 0.45, 0.15)
+    after = visible_anywhere(true_field(without), without, Scene(without), Camera(), walls, 0.45, 0.15)
     inner = (np.abs(walls.point_m[:, 0] - 3.06) < 0.1) & (walls.point_m[:, 1] < 2.4)
     inner &= walls.point_m[:, 1] > 0.2
     inner &= np.abs(walls.point_m[:, 2] - 1.3) < 1.0
@@ -111,6 +116,8 @@ def inspected(outcome: Outcome = Outcome.INSPECTED) -> tuple[TrialLog, World]:
         cell_m=np.zeros((5, 3), dtype=np.float32),
         cell_seen_s=np.array([1.0, 2.0, np.inf, 4.0, np.inf]),
         cell_visible=np.array([True, True, True, True, False]),
+        true_cell_seen_s=np.array([1.0, np.inf, np.inf, np.inf, 2.0]),
+        true_cell_visible=np.array([True, True, True, False, True]),
         viewpoint_m=np.array([[1.0, 9.0, 1.2], [4.0, 9.0, 1.2], [4.0, 5.0, 1.2]]),
         viewpoint_yaw_rad=np.zeros(3),
         viewpoint_segment=np.array([0, 0, 1]),
@@ -124,6 +131,7 @@ def test_figures_of_an_inspection() -> None:
     assert figures.measures(log, world) == {
         "coverage": 0.6,
         "coverage_visible": 0.75,
+        "coverage_truth": 0.5,
         "viewpoints": 3,
         "visited": 2,
         "unreachable": 1.0,

@@ -20,6 +20,11 @@ def coverage_visible(log: TrialLog) -> float:
     return _share(np.isfinite(log.cell_seen_s[log.cell_visible]))
 
 
+def coverage_truth(log: TrialLog) -> float:
+    """Share of the true surface's cells, blocks included, that can be seen and were; NaN without any."""
+    return _share(np.isfinite(log.true_cell_seen_s[log.true_cell_visible]))
+
+
 def over_time(log: TrialLog, times_s: Float) -> Float:
     """Share of the visible cells seen by each time (T,) -> (T,); NaN without any."""
     seen_s = np.sort(log.cell_seen_s[log.cell_visible])
@@ -65,6 +70,7 @@ def measures(log: TrialLog, world: World) -> dict[str, int | float | str]:
     return {
         "coverage": coverage(log),
         "coverage_visible": coverage_visible(log),
+        "coverage_truth": coverage_truth(log),
         "viewpoints": len(log.viewpoint_visited_s),
         "visited": visited,
         "unreachable": unreachable(log),

@@ -8,8 +8,9 @@ import numpy as np
 
 from uavexp.inspection.lattice import lattice_of
 from uavexp.inspection.plan import sparse_places
-from uavexp.inspection.reference import Surface, reference_field
+from uavexp.inspection.reference import Surface
 from uavexp.inspection.visibility import Camera, Grid, visible_cells, witnesses
+from uavexp.mapping.base import DistanceField
 from uavexp.scene import Scene
 from uavexp.types import Bool, Float, Int, World
 
@@ -21,7 +22,7 @@ class Coverage:
     """When each cell was first seen, in truth.
 
     Attributes:
-        surface: target cells (N,) of the reference map.
+        surface: target cells (N,), of the reference map or of the truth.
         camera: that looks, level.
         tolerance_m: a cell counts as seen when the true surface met on the line of sight lies
             within this of the cell, along the cell's normal.
@@ -61,19 +62,25 @@ def is_met(scene: Scene, eye_m: Float, point_m: Float, normal: Float, tolerance_
 
 
 def visible_anywhere(
-    world: World, scene: Scene, camera: Camera, surface: Surface, clearance_m: float, tolerance_m: float
+    field: DistanceField,
+    world: World,
+    scene: Scene,
+    camera: Camera,
+    surface: Surface,
+    clearance_m: float,
+    tolerance_m: float,
 ) -> Bool:
     """Cells (N,) that exist in truth and are seen from some place that the vehicle can reach there.
 
     Args:
-        world: the truth, its movers left out.
+        field: of the truth (`reference_field`), its movers left out.
+        world: the truth.
         scene: of the same.
         camera: that looks.
         surface: target cells (N,).
         clearance_m: of the places.
         tolerance_m: between cell and true surface.
     """
-    field = reference_field(world.vertices_m, world.triangles, world.bounds_m)
     lattice = lattice_of(field, world.flight_bounds_m, world.start_m, clearance_m)
     grid = Grid(field.state, field.origin_m, field.voxel_size_m)
     witness: Int = witnesses(grid, camera.optics, sparse_places(lattice), surface.point_m, surface.normal)

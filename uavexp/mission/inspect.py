@@ -122,8 +122,10 @@ class Inspect:
     time_per_viewpoint_s: float = 8.0
     time_per_path_spm: float = 4.0
     _guide: TourGuide | None = field(init=False, repr=False, default=None)
-    _coverage: Coverage = field(init=False, repr=False)
+    _coverage: Coverage = field(init=False, repr=False)  # of the reference's surface
     _visible: Any = field(init=False, repr=False)  # (N,) cells that can be seen in truth
+    _true_coverage: Coverage = field(init=False, repr=False)  # of the true surface, blocks included
+    _true_visible: Any = field(init=False, repr=False)  # (M,)
     _scene: Scene = field(init=False, repr=False)
     _time_limit_s: float = field(init=False, repr=False, default=0.0)
     _next_look_s: float = field(init=False, repr=False, default=0.0)
@@ -197,15 +199,21 @@ class Inspect:
             )
             raise WorldError(message)
         camera, settings = self._camera(), self._settings()
+        truth = reference_field(world.vertices_m, world.triangles, world.bounds_m)
+        surface = surface_of_mesh(world.vertices_m, world.triangles, truth, world.start_m, self.cell_m)
         self._scene = scene
-        self._coverage = Coverage(
-            surface=plan.surface,
-            camera=camera,
-            tolerance_m=self.cell_tolerance_m,
-            seen_s=np.full(len(plan.surface), np.inf),
+        self._coverage, self._true_coverage = (
+            Coverage(
+                surface=cells,
+                camera=camera,
+                tolerance_m=self.cell_tolerance_m,
+                seen_s=np.full(len(cells), np.inf),
+            )
+            for cells in (plan.surface, surface)
         )
-        self._visible = visible_anywhere(
-            world, scene, camera, plan.surface, self.clearance_m, self.cell_tolerance_m
+        self._visible, self._true_visible = (
+            visible_anywhere(truth, world, scene, camera, cells, self.clearance_m, self.cell_tolerance_m)
+            for cells in (plan.surface, surface)
         )
         self._guide = TourGuide(
             plan=plan,
@@ -250,17 +258,20 @@ class Inspect:
         if observation.time_s >= self._next_look_s - 1e-9:
             self._next_look_s += LOOK_S
             yaw_rad = yaw_of(true_state.quaternion_wxyz)
-            self._coverage.look(self._scene, observation.time_s, true_state.position_m, yaw_rad)
+            for coverage in (self._coverage, self._true_coverage):
+                coverage.look(self._scene, observation.time_s, true_state.position_m, yaw_rad)
         return Outcome.INSPECTED if self._begun().finished else None
 
     def findings(self) -> dict[str, Any]:
         """Cells and when they were seen, viewpoints and when they were visited."""
-        guide, coverage = self._begun(), self._coverage
+        guide, coverage, true = self._begun(), self._coverage, self._true_coverage
         order, viewpoints = guide.plan.order, guide.plan.viewpoints
         return {
             "cell_m": coverage.surface.point_m.astype(np.float32),
             "cell_seen_s": coverage.seen_s,
             "cell_visible": self._visible | np.isfinite(coverage.seen_s),
+            "true_cell_seen_s": true.seen_s,
+            "true_cell_visible": self._true_visible | np.isfinite(true.seen_s),
             "viewpoint_m": viewpoints.position_m[order],
             "viewpoint_yaw_rad": viewpoints.yaw_rad[order],
             "viewpoint_segment": viewpoints.segment[order],

@@ -165,6 +165,9 @@ MOVERS = (
 # of inspections
 INSPECTION = (
     Metric(column="coverage_visible", label="Coverage of the visible [%]", digits=2, better=1, scale=100.0),
+    Metric(
+        column="coverage_truth", label="Coverage of the true surface [%]", digits=2, better=1, scale=100.0
+    ),
     Metric(column="coverage", label="Coverage of all targets [%]", digits=2, better=1, scale=100.0),
     Metric(column="viewpoints", label="Viewpoints", digits=1, is_count=True),
     Metric(column="unreachable", label="Viewpoints not reached", digits=2, better=-1, is_count=True),
