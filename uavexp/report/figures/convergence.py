@@ -20,12 +20,14 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 COST = "plan_cost_at_"  # column: cost of the best plan after so many iterations
+_SAME = 0.25  # a cost that differs more from the path's length is no length
 _SEARCH, _ITERATIONS = "wall_search_sum_s", "plan_iterations"
 
 
 def convergence(study: Study, arms: tuple[str, ...], looks: Mapping[str, Look], note: str) -> Drawing | None:
-    """Draw median and quartiles of cost over cost found in the end by any arm, over iterations and time.
+    """Draw median and quartiles of cost over the least cost found by any arm, over iterations and time.
 
+    Arms are compared with those of the same unit only: the cost of some is a length, of others a time.
     None where the trials have no history of cost.
     """
     names = [str(name) for name in study.trials.columns if str(name).startswith(COST)]
@@ -33,33 +35,51 @@ def convergence(study: Study, arms: tuple[str, ...], looks: Mapping[str, Look], 
     if not columns:
         return None
     trials = study.trials.assign(_arm=arm_names(study.trials, tuple(arm_axes(study))))
-    best = trials.groupby([*_world(trials)])[columns].min().min(axis=1).rename("_best")
-    trials = trials.join(best, on=_world(trials))
+    is_length = {arm: _is_length(trials[trials["_arm"] == arm], columns) for arm in arms}
+    trials["_is_length"] = trials["_arm"].map(is_length)
+    within = [*_world(trials), "_is_length"]
+    trials = trials.join(trials.groupby(within)[columns].min().min(axis=1).rename("_best"), on=within)
     figure = canvas.new_figure(canvas.PAGE_IN, 2.9)
     by_iteration, by_time = figure.subplots(1, 2, sharey=True)
     iterations = np.array([float(column[len(COST) :]) for column in columns])
     for arm in arms:
         flown = trials[trials["_arm"] == arm]
         share = flown[columns].to_numpy(dtype=float) / flown["_best"].to_numpy(dtype=float)[:, None]
+        share[:, iterations > _longest(flown)] = np.nan
         if not np.isfinite(share).any():
             continue
-        _draw(by_iteration, iterations, share, looks[arm], arm)
+        label = arm if is_length[arm] or not any(is_length.values()) else f"{arm} (time)"
+        _draw(by_iteration, iterations, share, looks[arm], label)
         per_iteration_s = _seconds_per_iteration(flown)
         if np.isfinite(per_iteration_s):
             _draw(by_time, 1e3 * per_iteration_s * iterations, share, looks[arm], "")
     for axes, label in ((by_iteration, "iterations"), (by_time, "search time [ms]")):
         axes.set(xscale="log", xlabel=label)
-    by_iteration.set_ylabel("cost over the best found by any")
+    by_iteration.set_ylabel("cost over the least found")
     canvas.tidy(by_iteration, by_time)
     figure.legend(loc="outside upper center", ncols=4, fontsize=7.5)
     return Drawing(name="convergence", caption=f"{_CAPTION} {note}", figure=figure)
 
 
 _CAPTION = (
-    "Cost of the best plan so far over the best that any arm found in that world: median and quartiles, from "
-    "where half of the trials have a plan. Left over iterations (each planner's own unit), right over time: "
-    "iterations times the arm's median time of one, on the machine named in run.json."
+    "Cost of the best plan so far over the least that any arm found in that world, of the arms that count "
+    "the same: length, or time where that is said. Median and quartiles, from where half of the trials have "
+    "a plan. Left over iterations (each planner's own unit), right over time: iterations times the arm's "
+    "median time of one, on the machine named in run.json."
 )
+
+
+def _is_length(flown: pd.DataFrame, columns: list[str]) -> bool:
+    """Whether an arm's cost is the length of its path, by the values."""
+    if "plan_path_length_m" not in flown:
+        return True
+    ratio = flown[columns[-1]].astype(float) / flown["plan_path_length_m"].astype(float)
+    return not abs(float(ratio.median()) - 1.0) > _SAME
+
+
+def _longest(flown: pd.DataFrame) -> float:
+    """Iterations of the longest search; inf when they were not counted."""
+    return float(flown[_ITERATIONS].max()) if _ITERATIONS in flown else float("inf")
 
 
 def _world(trials: pd.DataFrame) -> list[str]:
