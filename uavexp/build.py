@@ -247,6 +247,9 @@ def _check_endings(parts: Parts) -> None:
         interval_s = getattr(policy, "interval_s", 0.0)
         if interval_s >= parts.stuck_s:
             raise ConfigError(f"stuck_s must be > {path}.interval_s = {interval_s}, got {parts.stuck_s}")
+    patience_s = getattr(parts.mission, "patience_s", 0.0)
+    if 2.0 * patience_s >= parts.stuck_s:  # a stop is put off once before it is given up
+        raise ConfigError(f"stuck_s must be > 2 mission.patience_s = {2.0 * patience_s}, got {parts.stuck_s}")
     names = type(parts.mission).__name__, type(parts.explorer).__name__
     if names == ("Explore", "TargetOnly"):
         raise ConfigError("mission=explore has no target: it needs explorer=frontier, got target_only")

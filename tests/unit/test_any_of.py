@@ -152,6 +152,11 @@ def test_a_slow_clock_inside_is_refused_like_one_alone() -> None:
     assert told == "stuck_s must be > trigger.policies.clock.interval_s = 30.0, got 20.0"
 
 
+def test_patience_that_would_end_a_flight_as_stuck_is_refused() -> None:
+    told = refusal("mission=inspect", "mission.patience_s=10")
+    assert told == "stuck_s must be > 2 mission.patience_s = 20.0, got 20.0"
+
+
 def test_only_the_trigger_holds_components() -> None:
     config = cell().config
     holding = [group for group in GROUPS if any(isinstance(value, dict) for value in config[group].values())]

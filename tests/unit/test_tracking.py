@@ -126,6 +126,10 @@ def front(x: float, y: float = 0.0) -> Clusters:
     return clusters(((x - 0.3, y - 0.3, -0.5), (x - 0.2, y + 0.3, 0.5)))
 
 
+def both(one: Clusters, other: Clusters) -> Clusters:
+    return Clusters(*(np.concatenate(pair) for pair in zip(one, other, strict=True)))
+
+
 def test_the_centre_lies_half_a_width_behind_the_nearest_point() -> None:
     half = np.array([[0.3, 0.3, 0.5]])
     assert np.allclose(centres_m(front(4.0, 1.0), half, np.full((1, 3), np.nan), SENSOR_M), [[4.0, 1.0, 0.0]])
@@ -167,6 +171,27 @@ def test_a_track_is_born_confirmed_by_motion_and_dies_unseen() -> None:
     assert follow(tracker, [nothing] * 11) == [0]
     assert follow(tracker, [nothing] * 3) == []
     assert tracker.dropped == 0
+
+
+def test_a_track_that_fits_keeps_its_cluster_whatever_another_could_have() -> None:
+    """One joint assignment would give the walker the speck behind it, and its own cluster to the newcomer."""
+    tracker = Tracker(RULE)
+    follow(tracker, [front(4.0, 0.1 * step) for step in range(11)])
+    assert follow(tracker, [both(front(4.0, 1.1), front(4.0, 1.9))]) == [0]
+    follow(tracker, [both(front(4.0, 1.22), front(4.0, 0.75))])
+    assert tracker.tracks[0].filter.seen_m[1] == pytest.approx(1.22, abs=0.02)
+
+
+def test_a_walker_missed_for_long_is_not_what_appears_where_it_cannot_be() -> None:
+    tracker = Tracker(RULE._replace(coast_s=3.0))
+    follow(tracker, [front(4.0, 0.1 * step) for step in range(11)])
+    assert follow(tracker, [clusters()] * 20 + [front(4.0, -1.8)]) == [0], "1 m/s back for 2 s is -1.1 m"
+    assert len(tracker.tracks) == 2
+    assert follow(tracker, [front(4.0, -1.8)] * 2) == [0]
+    back = Tracker(RULE._replace(coast_s=3.0))
+    follow(back, [front(4.0, 0.1 * step) for step in range(11)])
+    assert follow(back, [clusters()] * 20 + [front(4.0, -0.6)]) == [0]
+    assert len(back.tracks) == 1
 
 
 def test_a_new_track_that_is_not_seen_again_is_forgotten_at_once() -> None:

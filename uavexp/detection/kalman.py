@@ -105,6 +105,11 @@ class MotionFilter:
         """Of the next observation's difference from the prediction (3, 3)."""
         return np.asarray(self._kalman.P[:3, :3] + self._kalman.R)
 
+    @property
+    def seen_m(self) -> Float:
+        """Where it was last observed (3,)."""
+        return self._seen_m
+
     def estimate(self, of: Estimate) -> tuple[Float, Float]:
         """Position (3,) and velocity (3,) now, from the filter or from the last two observed positions."""
         if of is Estimate.KALMAN:
@@ -119,7 +124,7 @@ class MotionFilter:
         self._kalman.predict(F=transition, Q=density * noise)
 
     def stay(self, position_m: Float) -> None:
-        """Be at a position (3,) after all, after `predict`."""
+        """Be at a position (3,) after all, after `predict`; the raw estimate goes on."""
         self._kalman.x[:3] = position_m
 
     def observe(self, position_m: Float) -> None:

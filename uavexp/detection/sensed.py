@@ -9,7 +9,7 @@ seen is never taken for a mover. Such returns are clustered and tracked (`tracke
   until then they are mapped like anything else, which is safe, and the map forgets them as
   soon as it sees through there again.
 - A mover that stands for `standing_s` is given back to the map, and stays a track until the
-  map has had it for `memory_s`; when it walks off it is a new object that moves.
+  map has had it for `memory_s` and then for `coast_s`; when it walks off it is a new object that moves.
 - One slower than about `free_m` in the time the map needs for a surface (0.2 s at 10 Hz) and
   `memory_s` is carried by the map as a fixed obstacle, which follows it.
 - One that is hidden coasts at its last velocity for `coast_s`, as far as no obstacle is in its way.

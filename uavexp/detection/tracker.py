@@ -76,7 +76,8 @@ class Track:
         before_m = self.filter.position_m.copy()
         self.filter.predict(period_s)
         if self.unseen_s > 0.0:
-            free_m = field.distance_m(np.stack([before_m, self.filter.position_m]))
+            after_m = np.append(self.filter.position_m[:2], before_m[2])  # the floor is in nobody's way
+            free_m = field.distance_m(np.stack([before_m, after_m]))
             if free_m[1] < min(free_m[0], float(self.half_size_m[:2].min())):
                 self.filter.stay(before_m)
 
@@ -137,10 +138,12 @@ class Tracker:
     @staticmethod
     def _miss(tracks: list[Track], scan: Scan, period_s: float) -> None:
         """Note that these were not observed."""
-        centre_m = np.array([track.filter.position_m for track in tracks]).reshape(-1, 3)
-        half_m = np.array([track.half_size_m for track in tracks]).reshape(-1, 3)
-        for track, empty in zip(tracks, seen_empty(scan, centre_m, half_m), strict=True):
+        for track in tracks:
             track.misses, track.unseen_s = track.misses + 1, track.unseen_s + period_s
+        known = [track for track in tracks if track.confirmed]
+        centre_m = np.array([track.filter.position_m for track in known]).reshape(-1, 3)
+        half_m = np.array([track.half_size_m for track in known]).reshape(-1, 3)
+        for track, empty in zip(known, seen_empty(scan, centre_m, half_m), strict=True):
             track.empty = track.empty + 1 if empty else 0
 
     def published(self, time_s: float) -> Tracks:
@@ -166,25 +169,25 @@ class Tracker:
     ) -> tuple[Int, dict[int, tuple[int, Float]]]:
         """Index of the track that each cluster (K,) belongs to, -1: to none; each track's cluster and centre.
 
-        The assignment first; then clusters inside the predicted box of a track are more of the same body.
+        The assignment first; then confirmed tracks that fit none take what is left and near enough to where
+        they were last seen; then clusters inside the predicted box of a track are more of the same body.
         """
         owner = np.full(len(clusters), -1)
         if not (self.tracks and len(clusters)):
             return owner, {}
-        from scipy.optimize import linear_sum_assignment
-
         predicted_m = np.stack([track.filter.position_m for track in self.tracks])[:, None]
         known_m = np.stack([track.half_size_m for track in self.tracks])[:, None]
         seen_m = centres_m(clusters, np.maximum(known_m, half_m), predicted_m, sensor_m)  # (T, K, 3)
         apart_m = seen_m - predicted_m
         gates = np.linalg.inv(np.stack([track.filter.innovation_covariance for track in self.tracks]))
         squared = ((apart_m @ gates) * apart_m).sum(axis=2)
-        turned_m = self._turned_m(period_s)[:, None]
-        reached = np.linalg.norm(apart_m, axis=2) <= turned_m
-        cost = np.where(reached, self.rule.gate**2 + squared, _FAR)
-        cost = np.where(squared <= self.rule.gate**2, squared, cost)
-        row, column = linear_sum_assignment(cost)
-        pairs = [(int(t), int(k)) for t, k in zip(row, column, strict=True) if cost[t, k] < _FAR]
+        cost = np.where(squared <= self.rule.gate**2, squared, _FAR)
+        pairs = _assigned(cost)
+        from_m = np.stack([track.filter.seen_m for track in self.tracks])[:, None]
+        turned_m = np.linalg.norm(seen_m - from_m, axis=2)
+        free = np.isin(np.arange(len(self.tracks)), [t for t, _ in pairs], invert=True)[:, None]
+        free = free & np.isin(np.arange(len(clusters)), [k for _, k in pairs], invert=True)
+        pairs += _assigned(np.where(free & (turned_m <= self._reach_m(period_s)[:, None]), turned_m, _FAR))
         for t, k in pairs:
             owner[k] = t
         middle_m = 0.5 * (clusters.low_m + clusters.high_m)
@@ -193,13 +196,13 @@ class Tracker:
         owner[more] = np.argmax(inside[:, more], axis=0)
         return owner, {t: (k, seen_m[t, k]) for t, k in pairs}
 
-    def _turned_m(self, period_s: float) -> Float:
-        """How far (T,) from its prediction each track may be if it turned since it was seen; new: 0."""
+    def _reach_m(self, period_s: float) -> Float:
+        """How far (T,) from where it was last seen each track may be by now; new ones: -1."""
         noise_m = _NOISES * self.rule.motion.position_noise_m
         return np.array([
-            2.0 * float(np.linalg.norm(track.filter.velocity_mps)) * (track.unseen_s + period_s) + noise_m
+            float(np.linalg.norm(track.filter.velocity_mps)) * (track.unseen_s + period_s) + noise_m
             if track.confirmed
-            else 0.0
+            else -1.0
             for track in self.tracks
         ])  # fmt: skip
 
@@ -226,6 +229,14 @@ class Tracker:
         ]
         self.dropped += len(self.tracks) - len(sound)
         self.tracks = sound
+
+
+def _assigned(cost: Float) -> list[tuple[int, int]]:
+    """Pairs of row and column of the least total cost; none that costs `_FAR`."""
+    from scipy.optimize import linear_sum_assignment
+
+    pairs = zip(*linear_sum_assignment(cost), strict=True)
+    return [(int(t), int(k)) for t, k in pairs if cost[t, k] < _FAR]
 
 
 def centres_m(clusters: Clusters, half_m: Float, predicted_m: Float, sensor_m: Float) -> Float:

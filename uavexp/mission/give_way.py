@@ -23,7 +23,7 @@ _ASIDE_M = 2.5  # a step aside goes no farther
 _FAR_WORTH = 0.05  # m of room that a metre of way must bring
 _ENOUGH_M = 0.3  # room beyond what must be kept is worth nothing
 _SAME_M = 0.25  # places so near to each other are one
-_HELD_WORTH_M = 0.15  # of room that another place must bring to be worth a change of mind
+_HELD_WORTH_M = 0.15  # by which another place must be better, room on the way and there added up
 _ALONG = 6  # samples of the way to a place, for its clearance
 
 

@@ -42,7 +42,7 @@ class Tour(StrEnum):
 
 @dataclass(slots=True, kw_only=True)
 class Inspect:
-    """Inspected = every viewpoint was visited, or found to be blocked or out of reach.
+    """Inspected = every viewpoint was visited, or found to be blocked, out of reach or kept by movers.
 
     The reference map is the world's own, or its geometry before blocks were put into it. The
     plan is made on it once, before the flight; the flight knows the truth by its live map only.
@@ -117,7 +117,7 @@ class Inspect:
     rounds: int = 1
     rate_hz: float = 5.0
     keep_m: float = 0.5
-    patience_s: float = 20.0
+    patience_s: float = 8.0
     time_base_s: float = 120.0
     time_per_viewpoint_s: float = 8.0
     time_per_path_spm: float = 4.0

@@ -99,6 +99,7 @@ class TourGuide:
     _blocked: Bool = field(init=False, repr=False)  # (V,) planned stops the live map has blocked
     _arrived_s: float = field(init=False, repr=False, default=math.inf)
     _waiting_s: float = field(init=False, repr=False, default=math.inf)  # since when, for movers to pass
+    _aside_m: Float | None = field(init=False, repr=False, default=None)  # (3,) stepped to at present
     _yaw_rad: float = field(init=False, repr=False, default=math.nan)
     _finished: bool = field(init=False, repr=False, default=False)
     _limits: Limits | None = field(init=False, repr=False, default=None)
@@ -136,6 +137,7 @@ class TourGuide:
         free: Free = cache(partial(self._is_free, observation))
         stop = self._next(observation, free)
         if stop is not None and not fresh and not self._is_left(stop, observation, free):
+            free = cache(partial(self._is_free, observation))  # there may be other stops by now
             stop = self._next(observation, free)
         if stop is None:
             return None
@@ -189,7 +191,7 @@ class TourGuide:
             self._waited_s[stop] += 1.0 / self.rate_hz
         if self._waited_s[stop] < self.patience_s:
             return True
-        self._put_off(stop, observation.time_s)
+        self._put_off(stop, observation.time_s, for_movers=True)
         return False
 
     def _is_free(self, observation: Observation, stop: int) -> bool:
@@ -213,16 +215,18 @@ class TourGuide:
         """Where to go for a stop: to it, or aside while movers come there."""
         limits = self._limits
         if limits is None or free(stop):
+            self._aside_m = None
             return np.asarray(self._stops.position_m[stop])
-        return aside_m(
+        self._aside_m = aside_m(
             observation.tracks,
             observation.field,
             observation.state.position_m,
             self._refuges_m(observation),
             limits.body_radius_m + self.keep_m,
             limits,
-            None if observation.goal is None else observation.goal.position_m,
+            self._aside_m,
         )
+        return self._aside_m
 
     def _refuges_m(self, observation: Observation) -> Float:
         """Places (N, 3) to step aside to: the plan's, and as high as may be flown, over those who walk."""
@@ -245,14 +249,15 @@ class TourGuide:
         if changed and self._is_planned():
             self._adapt(observation)
 
-    def _put_off(self, stop: int, time_s: float) -> None:
+    def _put_off(self, stop: int, time_s: float, *, for_movers: bool = False) -> None:
         again = self._state[stop] is Stop.PUT_OFF
         self._state[stop] = Stop.GIVEN_UP if again else Stop.PUT_OFF
-        self._after_s[stop], self._waited_s[stop] = time_s + self.again_after_s, 0.0
+        self._after_s[stop] = time_s + (0.0 if for_movers else self.again_after_s)
+        self._waited_s[stop], self._waiting_s = 0.0, math.inf
         self._order.remove(stop)
         self._order.append(stop)
         self._arrived_s = math.inf
-        if self._is_planned():
+        if self._is_planned() and not for_movers:
             self._blocked[stop] = True
 
     def _adapt(self, observation: Observation) -> None:

@@ -22,7 +22,7 @@ from uavexp.mapping.base import DistanceField
 from uavexp.types import Float, Float32, PlanRequest, Tracks
 
 COLUMNS = 17  # of a row: position 3, velocity 3, half size 3, variance 3, inset, cap, horizon, turn, speed
-_INSET, _CAP, _HORIZON, _TURN, _SPEED = 12, 13, 14, 15, 16
+INSET, CAP, HORIZON, TURN, SPEED = 12, 13, 14, 15, 16
 _LEAST_M = 0.05  # a stamped cell is closed, but no place that nothing can leave
 _SIGMAS = 1.0  # k
 _CAP_M = 0.3  # of the growth
@@ -42,15 +42,15 @@ def box_gap(half_x: float, half_y: float, half_z: float, x: float, y: float, z: 
 @nb.njit(cache=True, inline="always")
 def moved_s(row: Float, ahead_s: float) -> float:
     """For how long a mover has moved on after a time: until it turned."""
-    return float(min(ahead_s, max(row[_TURN], 0.0)))
+    return float(min(ahead_s, max(row[TURN], 0.0)))
 
 
 @nb.njit(cache=True, inline="always")
 def grown_m(row: Float, ahead_s: float) -> float:
     """By how much a mover's box has grown after a time."""
     variance = row[9] + ahead_s * (row[10] + ahead_s * row[11])
-    turned = min(row[_SPEED] * max(ahead_s - row[_TURN], 0.0), _TURN_CAP_M)
-    return float(min(math.sqrt(max(variance, 0.0)), row[_CAP]) + turned)
+    turned = min(row[SPEED] * max(ahead_s - row[TURN], 0.0), _TURN_CAP_M)
+    return float(min(math.sqrt(max(variance, 0.0)), row[CAP]) + turned)
 
 
 @nb.njit(cache=True)
@@ -67,14 +67,14 @@ def clearance_after(movers: Float, x: float, y: float, z: float, ahead_s: float)
     least = np.inf
     for b in range(movers.shape[0]):
         row = movers[b]
-        if ahead_s > row[_HORIZON]:
+        if ahead_s > row[HORIZON]:
             continue
         on_s = moved_s(row, ahead_s)
         gap = box_gap(
             row[6], row[7], row[8],
             x - row[0] - on_s * row[3], y - row[1] - on_s * row[4], z - row[2] - on_s * row[5],
         )  # fmt: skip
-        least = min(least, gap - grown_m(row, ahead_s) - row[_INSET])
+        least = min(least, gap - grown_m(row, ahead_s) - row[INSET])
     return float(least)
 
 
@@ -124,8 +124,9 @@ def turns_s(tracks: Tracks, field: DistanceField, horizon_s: float) -> Float:
     """Time (B,) until each mover comes to a mapped obstacle, s; inf: not within the horizon."""
     ahead_s: Float = _TURN_STEP_S * np.arange(max(math.ceil(horizon_s / _TURN_STEP_S), 1) + 1.0)
     places_m = tracks.predicted_m(tracks.time_s + ahead_s)
+    places_m[..., 2] = tracks.position_m[:, None, 2]  # the floor is in nobody's way
     free_m = field.distance_m(places_m.reshape(-1, 3)).reshape(places_m.shape[:2])
-    near = free_m[:, 1:] < tracks.half_size_m[:, :1] + _TURN_M
+    near = free_m[:, 1:] < tracks.half_size_m[:, :2].max(axis=1)[:, None] + _TURN_M
     coming = near & (np.diff(free_m, axis=1) < -0.1 * _TURN_STEP_S)  # not what it is walking away from
     return np.where(coming.any(axis=1), ahead_s[1:][np.argmax(coming, axis=1)], np.inf)
 
@@ -166,9 +167,9 @@ class MovingObstacles:
         )
         rows[:, 9] = place + ahead_s * (both + ahead_s * speed)
         rows[:, 10], rows[:, 11] = both + 2.0 * ahead_s * speed, speed
-        rows[:, _INSET], rows[:, _CAP] = self.body_radius_m + self.margin_m, _CAP_M
-        rows[:, _HORIZON], rows[:, _TURN] = self.horizon_s - ahead_s, turn_s - ahead_s
-        rows[:, _SPEED] = np.linalg.norm(tracks.velocity_mps, axis=1)
+        rows[:, INSET], rows[:, CAP] = self.body_radius_m + self.margin_m, _CAP_M
+        rows[:, HORIZON], rows[:, TURN] = self.horizon_s - ahead_s, turn_s - ahead_s
+        rows[:, SPEED] = np.linalg.norm(tracks.velocity_mps, axis=1)
         return rows
 
     def clearance_m(self, points_m: Float, times_s: Float) -> Float:
@@ -211,8 +212,9 @@ class MovingObstacles:
         distance = field.distance.copy()
         pace = np.array([np.linalg.norm(request.velocity_mps), speed_mps, acceleration_mps2])
         for row in table:
-            ends_m = row[:3] + np.array([[0.0], [max(row[_HORIZON], 0.0)]]) * row[3:6]
-            reach_m = row[6:9] + row[_INSET] + row[_CAP] + _TURN_CAP_M + safe_m - least_m
+            ends_m = row[:3] + np.array([[0.0], [max(row[HORIZON], 0.0)]]) * row[3:6]
+            turned_m = _TURN_CAP_M if row[TURN] < row[HORIZON] else 0.0
+            reach_m = row[6:9] + row[INSET] + row[CAP] + turned_m + safe_m - least_m
             low_m, high_m = ends_m.min(axis=0) - reach_m, ends_m.max(axis=0) + reach_m
             _stamp(
                 distance, field.origin_m, field.voxel_size_m, row[None], low_m, high_m,

@@ -19,7 +19,8 @@ the vehicle. Readings:
 - `speed_s` is the t_th of (4-2). Literally 1.2 s, which makes d_safe 3.8 m at 2.5 m/s: no plan in
   a room clears that. The default is the time in which an answer takes effect: one check, the
   latency, and the onset of a turn. With δ equal to the planner's margin a new plan is free
-  of risk, so the event clears itself.
+  of risk, so the event clears itself; only a mover that the planner expects to turn at a wall, which
+  is not asked here, can fire again.
 - `min_interval_s`: a risk that no plan can clear (a mover that comes nearer than d_safe whatever is
   done) asks again after this time, not at every check: a new plan is of use only once the
   prediction has changed, and each one disturbs the flight.

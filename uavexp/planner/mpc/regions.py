@@ -3,7 +3,7 @@
 Static: the distance to a convex obstacle is convex, so the plane that touches it at any point
 never promises more than there is; it is taken where the vehicle is predicted and a little to
 each side of it, or the wall opposite would go unnoticed. Dynamic: a mover's upright box, grown by
-its uncertainty, the body's radius and the margin (`moving`), is convex, so any half space that
+its uncertainty, a turn, the body's radius and the margin (`moving`), is convex, so any half space that
 touches it keeps the vehicle out; the one chosen faces the vehicle, or, where that is inside,
 lets it pass on the side on which the two would miss each other.
 """
@@ -16,7 +16,7 @@ import numba as nb
 import numpy as np
 
 from uavexp.mapping.field import value_and_gradient
-from uavexp.planner.moving import grown_m, moved_s
+from uavexp.planner.moving import HORIZON, INSET, TURN, grown_m, moved_s
 from uavexp.types import Float, Float32, Int
 
 _AROUND_M = 0.25  # how far to the sides the static field is asked
@@ -75,12 +75,13 @@ def mover_planes(points: Float, velocities: Float, ahead_s: Float, movers: Float
     bound, rows = np.empty(most), 0
     for k in range(len(points)):
         for row in movers:
-            if ahead_s[k] > row[14]:
+            if ahead_s[k] > row[HORIZON]:
                 continue
             centre, half = row[0:3] + moved_s(row, ahead_s[k]) * row[3:6], row[6:9]
-            kept = row[12] + grown_m(row, ahead_s[k])
+            kept = row[INSET] + grown_m(row, ahead_s[k])
             apart = points[k] - centre
-            unit = facing(apart, velocities[k] - row[3:6], half, kept)
+            drift = row[3:6] if ahead_s[k] <= row[TURN] else np.zeros(3)
+            unit = facing(apart, velocities[k] - drift, half, kept)
             support = (np.abs(unit) * half).sum() + kept
             if (unit * apart).sum() - support > _REACH_M:
                 continue
