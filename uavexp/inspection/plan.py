@@ -123,7 +123,7 @@ def plan_inspection(
         settings: parameters.
     """
     settings = settings or Settings()
-    targets = surface.part(np.abs(surface.normal[:, 2]) <= np.sin(settings.max_tilt_rad))
+    targets = upright(surface, settings.max_tilt_rad)
     segments = segments_of(targets, settings.growing)
     lattice = lattice_of(
         field_, flight_bounds_m, start_m, settings.clearance_m, settings.cell_m, settings.layer_m
@@ -162,6 +162,11 @@ def plan_inspection(
         lattice=lattice,
         statistics=statistics,
     )
+
+
+def upright(surface: Surface, max_tilt_rad: float) -> Surface:
+    """Its cells whose normal rises or falls no more than this."""
+    return surface.part(np.abs(surface.normal[:, 2]) <= np.sin(max_tilt_rad))
 
 
 def sparse_places(lattice: Lattice) -> Float:

@@ -19,7 +19,7 @@ from uavexp.errors import (
 )
 from uavexp.explorer.base import Explorer
 from uavexp.geometry import yaw_of
-from uavexp.inspection.plan import InspectionPlan, Settings, plan_inspection, visited_by_nearest
+from uavexp.inspection.plan import InspectionPlan, Settings, plan_inspection, upright, visited_by_nearest
 from uavexp.inspection.reference import reference_field, surface_of_mesh
 from uavexp.inspection.view_angle import Weights
 from uavexp.inspection.viewpoints import Pattern
@@ -201,6 +201,7 @@ class Inspect:
         camera, settings = self._camera(), self._settings()
         truth = reference_field(world.vertices_m, world.triangles, world.bounds_m)
         surface = surface_of_mesh(world.vertices_m, world.triangles, truth, world.start_m, self.cell_m)
+        surface = upright(surface, settings.max_tilt_rad)  # what a level camera looks at, as of the plan's
         self._scene = scene
         self._coverage, self._true_coverage = (
             Coverage(
