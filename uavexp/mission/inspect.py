@@ -25,7 +25,7 @@ from uavexp.inspection.view_angle import Weights
 from uavexp.inspection.viewpoints import Pattern
 from uavexp.inspection.visibility import Camera
 from uavexp.mission import unforeseen
-from uavexp.mission.coverage import Coverage, visible_anywhere
+from uavexp.mission.coverage import Coverage, reachable_m, visible_anywhere
 from uavexp.mission.tour_guide import Look, TourGuide
 from uavexp.scene import Scene
 from uavexp.types import Float, Limits, Observation, Outcome, State, Surface, World
@@ -212,8 +212,9 @@ class Inspect:
             )
             for cells in (plan.surface, surface)
         )
+        eyes_m = reachable_m(truth, world, self.clearance_m)
         self._visible, self._true_visible = (
-            visible_anywhere(truth, world, scene, camera, cells, self.clearance_m, self.cell_tolerance_m)
+            visible_anywhere(truth, scene, camera, cells, eyes_m, self.cell_tolerance_m)
             for cells in (plan.surface, surface)
         )
         self._guide = TourGuide(

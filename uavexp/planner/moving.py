@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from dataclasses import field as dataclass_field
 
 import numba as nb
 import numpy as np
@@ -140,11 +141,16 @@ class MovingObstacles:
     margin_m: float
     horizon_s: float  # predictions count for so long after the tracks' time
     field: DistanceField | None = None  # of what they turn at; None: of nothing
+    _turn_s: Float = dataclass_field(init=False, repr=False)  # (B,) after the tracks' time
 
     def __post_init__(self) -> None:
         require_non_negative(
             body_radius_m=self.body_radius_m, margin_m=self.margin_m, horizon_s=self.horizon_s
         )
+        turn_s = np.full(len(self.tracks), np.inf)
+        if self.field is not None:
+            turn_s = turns_s(self.tracks, self.field, self.horizon_s)
+        object.__setattr__(self, "_turn_s", turn_s)  # asked for by every table
 
     def __len__(self) -> int:
         return len(self.tracks)
@@ -153,10 +159,7 @@ class MovingObstacles:
         """Rows (B, COLUMNS) for kernels, with times counted from this absolute time."""
         tracks, ahead_s = self.tracks, from_s - self.tracks.time_s
         rows = np.empty((len(tracks), COLUMNS))
-        turn_s = np.full(len(tracks), np.inf)
-        if self.field is not None:
-            turn_s = turns_s(tracks, self.field, self.horizon_s)
-        rows[:, 0:3] = tracks.position_m + np.minimum(ahead_s, turn_s)[:, None] * tracks.velocity_mps
+        rows[:, 0:3] = tracks.position_m + np.minimum(ahead_s, self._turn_s)[:, None] * tracks.velocity_mps
         rows[:, 3:6], rows[:, 6:9] = tracks.velocity_mps, tracks.half_size_m
         diagonal = np.einsum("nii->ni", tracks.covariance)
         mixed = np.einsum("nii->ni", tracks.covariance[:, :3, 3:])
@@ -168,7 +171,7 @@ class MovingObstacles:
         rows[:, 9] = place + ahead_s * (both + ahead_s * speed)
         rows[:, 10], rows[:, 11] = both + 2.0 * ahead_s * speed, speed
         rows[:, INSET], rows[:, CAP] = self.body_radius_m + self.margin_m, _CAP_M
-        rows[:, HORIZON], rows[:, TURN] = self.horizon_s - ahead_s, turn_s - ahead_s
+        rows[:, HORIZON], rows[:, TURN] = self.horizon_s - ahead_s, self._turn_s - ahead_s
         rows[:, SPEED] = np.linalg.norm(tracks.velocity_mps, axis=1)
         return rows
 

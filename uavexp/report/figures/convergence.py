@@ -74,7 +74,7 @@ def _is_length(flown: pd.DataFrame, columns: list[str]) -> bool:
     if "plan_path_length_m" not in flown:
         return True
     ratio = flown[columns[-1]].astype(float) / flown["plan_path_length_m"].astype(float)
-    return not abs(float(ratio.median()) - 1.0) > _SAME
+    return not abs(float(ratio.median()) - 1.0) > _SAME  # NaN, no plan at all, is no time either
 
 
 def _longest(flown: pd.DataFrame) -> float:
