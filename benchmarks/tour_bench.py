@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,9 +17,12 @@ from uavexp.inspection import clusters as runs
 from uavexp.inspection.plan import InspectionPlan, Settings, path_from, plan_inspection
 from uavexp.inspection.reference import reference_field, surface_of_mesh
 from uavexp.inspection.travel import travel_matrix
+from uavexp.inspection.view_angle import choose_yaw
 from uavexp.inspection.viewpoints import Pattern
 from uavexp.inspection.visibility import Camera
-from uavexp.types import World
+from uavexp.mapping.base import DistanceField
+from uavexp.mission.more_stops import live_grid
+from uavexp.types import Float, World
 from uavexp.world.rooms import Rooms
 
 SIZES = {250: (22.0, 14.0), 500: (30.0, 20.0), 1000: (42.0, 28.0), 2000: (58.0, 40.0)}  # viewpoints: floor, m
@@ -37,7 +41,9 @@ def timed(call: Callable[[], Any]) -> tuple[Any, float]:
     return result, time.process_time() - begin
 
 
-def measure(floor_m: tuple[float, float], settings: Settings) -> tuple[InspectionPlan, dict[str, float]]:
+def measure(
+    floor_m: tuple[float, float], settings: Settings
+) -> tuple[InspectionPlan, DistanceField, dict[str, float]]:
     world = office(floor_m)
     field, field_s = timed(lambda: reference_field(world.vertices_m, world.triangles, world.bounds_m))
     surface, surface_s = timed(
@@ -48,14 +54,28 @@ def measure(floor_m: tuple[float, float], settings: Settings) -> tuple[Inspectio
     )
     _, travel_s = timed(lambda: travel_matrix(plan.lattice, plan.viewpoints.position_m))
     _, tour_s = timed(lambda: path_from(plan.start_travel_m, plan.travel_m, 0))
-    return plan, {
-        "field_s": field_s,
-        "surface_s": surface_s,
-        "plan_s": plan_s,
-        "of it travel_s": travel_s,
-        "of it tour_s": tour_s,
-        "total_s": field_s + surface_s + plan_s,
-    }
+    return (
+        plan,
+        field,
+        {
+            "field_s": field_s,
+            "surface_s": surface_s,
+            "plan_s": plan_s,
+            "of it travel_s": travel_s,
+            "of it tour_s": tour_s,
+            "total_s": field_s + surface_s + plan_s,
+        },
+    )
+
+
+def choosing_ms(plan: InspectionPlan, field: DistanceField) -> Float:
+    """Time of each choice of yaw (algorithm 2), with nothing seen yet: the most work."""
+    grid, weight, views = live_grid(field), plan.surface.area_m2, plan.viewpoints
+    calls = (
+        partial(choose_yaw, grid, Camera(), plan.surface, weight, position_m, float(yaw_rad))
+        for position_m, yaw_rad in zip(views.position_m, views.yaw_rad, strict=True)
+    )
+    return 1e3 * np.array([timed(call)[1] for call in calls])
 
 
 def merging(plan: InspectionPlan) -> list[str]:
@@ -78,12 +98,16 @@ def merging(plan: InspectionPlan) -> list[str]:
 
 def main() -> None:
     settings = Settings(pattern=Pattern(stand_off_m=1.5))
-    measure((12.0, 10.0), settings)
+    choosing_ms(*measure((12.0, 10.0), settings)[:2])
     for wanted, floor in SIZES.items():
-        plan, seconds = measure(floor, settings)
+        plan, field, seconds = measure(floor, settings)
         print(f"wanted {wanted}: {len(plan.viewpoints)} viewpoints, {len(plan.segments)} segments, "
               f"coverage {plan.planned_coverage:.4f}")  # fmt: skip
         print("  " + ", ".join(f"{name} {value:.2f}" for name, value in seconds.items()), flush=True)
+        choice_ms = choosing_ms(plan, field)
+        print(
+            f"  choice of yaw: median {np.median(choice_ms):.1f} ms, 99 % {np.quantile(choice_ms, 0.99):.1f} ms"
+        )
         if wanted == 500:
             print("\n".join(merging(plan)), flush=True)
 

@@ -16,9 +16,9 @@ import numpy as np
 from uavexp.errors import require, require_non_negative
 from uavexp.inspection.reference import Surface
 from uavexp.inspection.viewpoints import Viewpoints
-from uavexp.inspection.visibility import Camera, Grid, Optics, Views, is_framed, sighted_cells
+from uavexp.inspection.visibility import Camera, Grid, Optics, Views, framed_turns, half_turn, sighted_cells
 from uavexp.mapping.base import DistanceField
-from uavexp.types import Bool, Float, Int, Int32
+from uavexp.types import Bool, Float, Int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,10 +95,12 @@ def choose_yaw(
         candidates: yaws over 360°, evenly spaced, the nominal one among them.
     """
     require(candidates >= 1, f"candidates must be >= 1, got {candidates}")
-    position = np.ascontiguousarray(position_m, dtype=np.float64)
-    cells = sighted_cells(grid, camera.optics, position, surface.point_m, surface.normal)
+    worth = np.flatnonzero(weight > 0.0)  # no ray is cast to what is worth nothing
+    position, point_m = np.ascontiguousarray(position_m, dtype=np.float64), surface.point_m[worth]
+    seen = sighted_cells(grid, camera.optics, position, point_m, surface.normal[worth])
     turn = 2.0 * math.pi / candidates * _nearest_first(candidates)
-    scores = _scores(camera.optics, position, nominal_yaw_rad + turn, surface.point_m, weight, cells)
+    yaws = nominal_yaw_rad + turn
+    scores = _scores(camera.optics, position, yaws, point_m[seen], weight[worth][seen])
     best = int(np.argmax(scores > scores.max() - 1e-9))
     yaw = math.remainder(nominal_yaw_rad + float(turn[best]), 2.0 * math.pi)
     return ViewAngle(yaw, float(scores[best]), scores)
@@ -111,10 +113,12 @@ def _nearest_first(candidates: int) -> Int:
 
 
 @nb.njit(cache=True)
-def _scores(optics: Optics, eye: Float, yaws: Float, point: Float, weight: Float, cells: Int32) -> Float:
+def _scores(optics: Optics, eye: Float, yaws: Float, point: Float, weight: Float) -> Float:
+    """Sum of the weights of the cells (N,) in the image with each yaw (Y,)."""
     scores = np.zeros(yaws.shape[0])
-    for cell in cells:
-        for n in range(yaws.shape[0]):
-            if is_framed(optics, eye, yaws[n], point[cell]):
-                scores[n] += weight[cell]
+    for n in range(point.shape[0]):
+        azimuth_rad, half_rad = framed_turns(optics, eye, point[n])
+        for y in range(yaws.shape[0]):
+            if abs(half_turn(azimuth_rad - yaws[y])) <= half_rad:
+                scores[y] += weight[n]
     return scores

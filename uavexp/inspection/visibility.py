@@ -153,14 +153,29 @@ def _is_met(optics: Optics, eye: Float, point: Float, normal: Float) -> bool:
 
 
 @nb.njit(cache=True, inline="always")
+def half_turn(angle_rad: float) -> float:
+    """The same angle within [-pi, pi)."""
+    return angle_rad - 2.0 * math.pi * math.floor(angle_rad / (2.0 * math.pi) + 0.5)
+
+
+@nb.njit(cache=True, inline="always")
+def framed_turns(optics: Optics, eye: Float, point: Float) -> tuple[float, float]:
+    """Azimuth of a point, and how far a level camera's yaw may be from it to have it in the image.
+
+    With the yaw at an angle t from the azimuth, the image's half height at a level distance d is
+    slope * d * cos(t). Negative: the point is in no image.
+    """
+    x, y, z = point[0] - eye[0], point[1] - eye[1], abs(point[2] - eye[2])
+    high = optics.half_height_slope * math.hypot(x, y)
+    half_rad = min(optics.half_width_rad, math.acos(z / high)) if z < high else -1.0
+    return math.atan2(y, x), half_rad
+
+
+@nb.njit(cache=True, inline="always")
 def is_framed(optics: Optics, eye: Float, yaw: float, point: Float) -> bool:
     """Whether a point lies in the image of a level camera with this yaw."""
-    x, y = point[0] - eye[0], point[1] - eye[1]
-    turn = math.atan2(y, x) - yaw
-    turn -= 2.0 * math.pi * math.floor(turn / (2.0 * math.pi) + 0.5)
-    if abs(turn) > optics.half_width_rad:
-        return False
-    return bool(abs(point[2] - eye[2]) <= optics.half_height_slope * math.cos(turn) * math.hypot(x, y))
+    azimuth_rad, half_rad = framed_turns(optics, eye, point)
+    return bool(abs(half_turn(azimuth_rad - yaw)) <= half_rad)
 
 
 @nb.njit(cache=True)

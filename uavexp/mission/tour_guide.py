@@ -290,8 +290,7 @@ class TourGuide:
         if observation.time_s - self._arrived_s >= self.dwell_s:
             return True
         if self.view_adaptation:
-            wanted_rad = self._wanted_yaw_rad(stop, observation)
-            new = self._seen_now(observation, wanted_rad) & ~self.scanned
+            new = self._newly_seen(observation, self._wanted_yaw_rad(stop, observation))
             return float(self.plan.surface.area_m2[new].sum()) < self.settings.pattern.least_new_m2
         error_rad = wrap_angle(self._stops.yaw_rad[stop] - yaw_of(observation.state.quaternion_wxyz))
         return abs(float(error_rad)) <= self.yaw_tolerance_rad
@@ -305,16 +304,18 @@ class TourGuide:
         grid, position_m = live_grid(observation.field), observation.state.position_m
         return choose_yaw(grid, self.camera, surface, weight, position_m, planned_rad).yaw_rad
 
-    def _seen_now(self, observation: Observation, yaw_rad: float) -> Bool:
-        """Cells (N,) that the camera would see from here with a yaw, by the live map."""
-        surface, seen = self.plan.surface, np.zeros(len(self.scanned), dtype=np.bool_)
+    def _newly_seen(self, observation: Observation, yaw_rad: float) -> Bool:
+        """Cells (N,) not yet scanned that the camera would see from here with a yaw, by the live map."""
+        surface, left = self.plan.surface, np.flatnonzero(~self.scanned)
         eye_m = np.ascontiguousarray(observation.state.position_m)
         grid, optics = live_grid(observation.field), self.camera.optics
-        seen[visible_cells(grid, optics, eye_m, yaw_rad, surface.point_m, surface.normal)] = True
-        return seen
+        seen = visible_cells(grid, optics, eye_m, yaw_rad, surface.point_m[left], surface.normal[left])
+        new = np.zeros(len(surface), dtype=np.bool_)
+        new[left[seen]] = True
+        return new
 
     def _scan(self, observation: Observation) -> None:
-        self.scanned |= self._seen_now(observation, yaw_of(observation.state.quaternion_wxyz))
+        self.scanned |= self._newly_seen(observation, yaw_of(observation.state.quaternion_wxyz))
 
     def _go_on(self, observation: Observation) -> None:
         """More stops for what the live map says can still be seen; none: the inspection is over."""
