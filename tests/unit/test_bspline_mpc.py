@@ -233,6 +233,36 @@ def test_keeps_out_of_who_comes_towards_it(place: tuple[float, float]) -> None:
     assert np.linalg.norm(answer.motion.velocity, axis=1).max() <= 2.5
 
 
+@pytest.mark.parametrize("rate_radps", [2.0, 0.8])
+def test_the_thrust_never_turns_faster_than_it_may(rate_radps: float) -> None:
+    """Somebody 1 m ahead makes the horizon do all it may; its jerk is that of a turning thrust vector."""
+    limits = replace(LIMITS, max_body_rate_radps=rate_radps)
+    model, tracks = small_horizon(), people(0.0, ((1.6, 0.1), (-1.0, 0.0)))
+    wanted = straight(model, 1.5)
+    start = np.array([[0.0, 0.0, 1.0], [1.5, 0.0, 0.0], [0.8, 0.0, 0.0]])
+    answer = track(model, start, wanted, wanted, open_scene(tracks, 0.3), limits, 2)
+    assert answer.motion is not None
+    inputs = np.concatenate([start[2:], answer.motion.acceleration])
+    jerk = np.abs(np.diff(inputs, axis=0)) / model.step_s
+    assert jerk.max() == pytest.approx(9.81 * rate_radps, rel=1e-6)
+
+
+def test_plans_that_follow_ask_for_a_share_of_the_body_rate() -> None:
+    """Braking and side steps may ask for all of it, and the way back to the spline is not flown yet."""
+    request = ask(hall(), tracks=people(3.0, ((3.4, 3.2), (-0.6, 0.0))))
+    for share in (1.0, 0.3):
+        made, most, following = planner(turn_share=share), 0.0, request
+        for _ in range(8):
+            result = made.plan(following)
+            assert result.trajectory is not None
+            if not result.reason.endswith("first"):
+                most = max(most, 6.0 * float(np.abs(result.trajectory.coefficients[0, 3]).max()))
+            following = later(following, result)
+        assert 0.0 < most <= share * 9.81 * LIMITS.max_body_rate_radps * (1.0 + 1e-6)
+        if share == 1.0:
+            assert most > 0.3 * 9.81 * LIMITS.max_body_rate_radps
+
+
 def test_gives_way_as_deep_as_it_must() -> None:
     """A mover that is on the vehicle already: the slack of the first step is how deep that is."""
     tracks = people(0.0, ((0.0, 0.0), (0.0, 0.0)))
@@ -401,6 +431,7 @@ def test_bad_input_is_a_status() -> None:
         ("horizon_iterations", 0),
         ("final_iterations", 1.5),
         ("unknown", "no"),
+        ("turn_share", 0.0),
     ],
 )
 def test_parameters_are_checked(name: str, value: Any) -> None:

@@ -184,3 +184,37 @@ def test_thrust_is_the_wanted_force_along_the_body_as_it_stands():
     )
     rest = Reference(position_m=START, velocity_mps=np.zeros(3), acceleration_mps2=np.zeros(3), yaw_rad=0.0)
     assert controller.command(tilted, rest).thrust_N == pytest.approx(0.75 * 9.81 * np.cos(0.4))
+
+
+def worst_error_m(turn_share, seed):
+    """Largest error behind a reference that accelerates to a new corner every 0.3 s, yawing all along."""
+    rng, jerk, most = np.random.default_rng(seed), turn_share * 9.81 * 2.0, 2.4
+    position, velocity, acceleration = START.copy(), np.zeros(3), np.zeros(3)
+    references, corner, rate, heading = [], np.zeros(3), 0.0, 0.0
+    for k in range(1500):
+        if k % 30 == 0:
+            way = rng.normal(size=3) * [1.0, 1.0, 0.3]
+            corner = most * way / np.linalg.norm(way) - velocity  # back towards rest
+            corner *= min(1.0, most / np.linalg.norm(corner))
+        if k % 100 == 0:
+            rate = 1.8 * rng.choice([-1.0, 0.0, 1.0])
+        references.append((position, velocity, acceleration, heading, rate))
+        left = corner - acceleration
+        change = left * min(1.0, jerk * STEP_S / max(np.linalg.norm(left), 1e-12))
+        position = position + STEP_S * velocity + STEP_S**2 * (acceleration / 2.0 + change / 6.0)
+        velocity = velocity + STEP_S * (acceleration + change / 2.0)
+        acceleration, heading = acceleration + change, heading + rate * STEP_S
+    states, wanted = fly(
+        Quadrotor(),
+        lambda t: references[round(t / STEP_S)][:3],
+        15.0,
+        yaw=lambda t: references[round(t / STEP_S)][3:],
+    )
+    return float(np.linalg.norm([s.position_m for s in states] - wanted, axis=1).max())
+
+
+def test_a_thrust_that_turns_at_half_the_body_rate_is_followed():
+    """`planner.turn_share`: at the whole rate the quadrotor overshoots again and again."""
+    assert max(worst_error_m(0.5, seed) for seed in range(4)) < 0.2
+    assert max(worst_error_m(0.4, seed) for seed in range(4)) < 0.12
+    assert max(worst_error_m(1.0, seed) for seed in range(4)) > 0.3

@@ -24,7 +24,7 @@ def stopping_distance_m(speed_mps: float, limits: Limits) -> float:
 
     v²/(2a) + v a/(2j), or v sqrt(v/j) when the speed is too low to reach the full deceleration.
     """
-    jerk = _jerk_mps3(limits)
+    jerk = jerk_mps3(limits)
     acceleration = limits.max_acceleration_mps2
     if speed_mps * jerk < acceleration**2:
         return speed_mps * math.sqrt(speed_mps / jerk)
@@ -51,7 +51,7 @@ def braking_trajectory(
         A trajectory of at most three cubic pieces, at rest at its end.
     """
     strongest = limits.max_acceleration_mps2
-    jerk = _jerk_mps3(limits)
+    jerk = jerk_mps3(limits)
     if _surplus(strongest, velocity_mps, acceleration_mps2, jerk) <= 0.0:
         deceleration = strongest
     else:  # full deceleration would be too much: bisect for the one without a constant phase
@@ -79,7 +79,8 @@ def braking_trajectory(
     return _pieces(time_s, position_m, velocity_mps, (acceleration_mps2, wanted), durations)
 
 
-def _jerk_mps3(limits: Limits) -> float:
+def jerk_mps3(limits: Limits) -> float:
+    """Jerk at which the thrust vector turns at the body rate limit."""
     return GRAVITY_MPS2 * limits.max_body_rate_radps
 
 

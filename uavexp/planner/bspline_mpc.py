@@ -13,6 +13,8 @@ What the paper leaves open, decided here [ours]:
   left would touch a predicted mover, the vehicle comes to rest where that stays farthest from all of
   them, by braking or by a side step, and goes on from there (counted in `braked`): a mover does not
   look out, so merely stopping may be no rescue.
+- The horizon's jerk is limited to what turns the thrust vector at a share of the body rate limit. A
+  reference that asks for all of it again and again is not followed: the quadrotor overshoots.
 - A horizon that breaks a limit or comes too near a mapped obstacle is not flown: a new spline from the
   present state is tried once, and is the answer itself if it stays off the movers.
 
@@ -67,6 +69,7 @@ class BsplineMpc:
     keep_within_m: float = 0.5
     mover_margin_m: float = 0.5
     mover_horizon_s: float = 2.0
+    turn_share: float = 0.5
     slackened: int = field(default=0, init=False)  # requests at which the horizon gave way
     braked: int = field(default=0, init=False)  # requests at which only coming to rest was left
     _follower: Follower | None = field(default=None, init=False, repr=False)
@@ -101,6 +104,7 @@ class BsplineMpc:
             1.0 <= self.duration_margin <= 10.0,
             f"duration_margin must be in [1, 10], got {self.duration_margin}",
         )
+        require(0.0 < self.turn_share <= 1.0, f"turn_share must be in (0, 1], got {self.turn_share}")
         whole = {"order": (4, 8), "horizon_steps": (2, 60), "horizon_iterations": (1, 20)}
         whole |= dict.fromkeys(("first_iterations", "final_iterations", "max_expansions"), (1, 10**9))
         for name, (least, most) in whole.items():
@@ -152,6 +156,7 @@ class BsplineMpc:
             ),
             model=horizon_model(self.horizon_steps, self.horizon_step_s, *weights),
             iterations=self.horizon_iterations,
+            limits=replace(limits, max_body_rate_radps=self.turn_share * limits.max_body_rate_radps),
         )
 
     def plan(self, request: PlanRequest) -> PlanResult:

@@ -14,7 +14,7 @@ from uavexp.planner.mpc.guide import Guide, StaticPlanner, phase_of
 from uavexp.planner.mpc.horizon import HorizonModel, Motion, Scene, Tracked, to_trajectory, track
 from uavexp.planner.mpc.rejoin import BLENDS_S, rejoined, state_at
 from uavexp.planner.mpc.static_spline import instants, limit_excess
-from uavexp.types import Float, PlanRequest, Trajectory
+from uavexp.types import Float, Limits, PlanRequest, Trajectory
 
 SLACK_M = 1e-3  # more than this is a region that was not kept out of
 _ABOVE_M = 0.02  # clearance inside the horizon above the limit: room between its steps
@@ -37,6 +37,7 @@ class Follower:
     static: StaticPlanner
     model: HorizonModel
     iterations: int  # linearisations
+    limits: Limits  # of the horizon
 
     def follow(self, request: PlanRequest, guide: Guide, moving: MovingObstacles) -> Followed:
         """Plan along a guide.
@@ -83,11 +84,11 @@ class Follower:
         clearance_m, table = settings.min_clearance_m + _ABOVE_M, moving.table(request.time_s)
         scene = Scene(request.field, clearance_m, table, request.flight_bounds_m)
         guess = _last_motion(guide, request, ahead_s) or wanted
-        first = track(model, start, wanted, guess, scene, settings.limits, self.iterations)
+        first = track(model, start, wanted, guess, scene, self.limits, self.iterations)
         if first.slack_m <= SLACK_M or not len(moving):
             return first
         stop = Motion(*evaluate(self.static.brake(request), request.time_s + ahead_s))
-        second = track(model, start, wanted, stop, scene, settings.limits, self.iterations)
+        second = track(model, start, wanted, stop, scene, self.limits, self.iterations)
         better = second if second.slack_m < first.slack_m else first
         return better._replace(iterations=first.iterations + second.iterations)
 

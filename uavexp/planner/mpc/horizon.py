@@ -3,6 +3,7 @@
     min Σ ‖x_k - x_ref,k‖² + λ_u Σ ‖u_k‖² + ρ Σ (s_k + 10 s_k²)                                 (3a)
     x_0 = x(t_0), x_k = f(x_{k-1}, u_{k-1}, u_k)                                               (3b, 3c)
     |u_k| <= u_max per axis and ‖u_k‖ <= a_max; ‖v_k‖ <= v_max [ours, the paper has no bound]   (3d)
+    |u_k - u_{k-1}| <= j_max dt per axis [ours: what asks for more is not followed, but overshot]
     n · p_k >= b - s_k for the half spaces of `regions`, s_k >= 0, for all k                    (3e, 3f)
 
 x = [p, v], u = a. The input is held to first order, not zeroth: it runs linearly from u_{k-1} to
@@ -26,6 +27,7 @@ import numba as nb
 import numpy as np
 
 from uavexp.mapping.base import DistanceField
+from uavexp.planner.brake import jerk_mps3
 from uavexp.planner.mpc.regions import mover_planes, static_planes
 from uavexp.planner.mpc.static_cost import FAN, frames
 from uavexp.types import Float, Int, Limits, Trajectory
@@ -47,6 +49,7 @@ class HorizonModel(NamedTuple):
     place_start: Float  # (N, 3)
     speed: Float  # (N, N) v_1 .. v_N = speed @ u + speed_start @ start
     speed_start: Float  # (N, 3)
+    change: Float  # (3N, 4N) u_k - u_{k-1} of every axis, of inputs and slacks
 
 
 class Motion(NamedTuple):
@@ -110,7 +113,8 @@ def horizon_model(
     ]
     matrices = ca.Function("matrices", [], parts)()
     taken = [np.ascontiguousarray(matrices[f"o{n}"].full()) for n in range(len(parts))]
-    return HorizonModel(steps, step_s, *taken)
+    change = np.kron(np.eye(steps) - np.eye(steps, k=-1), np.eye(3))
+    return HorizonModel(steps, step_s, *taken, np.pad(change, ((0, 0), (0, steps))))
 
 
 def track(
@@ -141,18 +145,21 @@ def track(
     given = np.concatenate([start, wanted.place, wanted.velocity])
     gradient = np.concatenate([(model.gradient @ given).reshape(-1), np.full(n, _SLACK_PRICE)])
     most = max(limits.max_acceleration_mps2, float(np.linalg.norm(start[2])))
-    upper = np.concatenate([np.full(3 * n, most), np.full(n, 1e30)])
-    lower = np.concatenate([np.full(3 * n, -most), np.zeros(n)])
+    # at most so much change of an input per step, the first from the present acceleration on
+    change = model.step_s * jerk_mps3(limits)
+    present = np.concatenate([start[2], np.zeros(3 * (n - 1))])
+    upper = np.concatenate([np.full(3 * n, most), np.full(n, 1e30), present + change])
+    lower = np.concatenate([np.full(3 * n, -most), np.zeros(n), present - change])
     motion, slack = guess, np.zeros(n)
     for done in range(rounds):
         rows, least = _rows(model, start, motion, scene, limits)
         solution, _, flag, _ = daqp.solve(
             hessian,
             gradient,
-            rows,
+            np.concatenate([model.change, rows]),
             np.concatenate([upper, np.full(len(least), 1e30)]),
             np.concatenate([lower, least]),
-            np.zeros(4 * n + len(least), dtype=np.int32),
+            np.zeros(7 * n + len(least), dtype=np.int32),
         )
         if flag < 1 or not np.isfinite(solution).all():
             return Tracked(None, np.inf, done + 1)
@@ -194,7 +201,8 @@ def _rows(
     free = model.place_start @ start
     keep_out = _assemble(step, normal, bound, model.place, free, True)
     # a start beyond the limit, or driven there by its acceleration, must not make the QP infeasible
-    rise = 0.5 * model.step_s * float(np.linalg.norm(start[2]))
+    strength = float(np.linalg.norm(start[2]))
+    rise = 0.5 * strength * max(model.step_s, strength / jerk_mps3(limits))
     top = max(_QP_SHARE * limits.max_speed_mps, float(np.linalg.norm(start[1])) + rise)
     step, normal, bound = _ball_planes(motion.velocity, top)
     slower = _assemble(step, normal, bound, model.speed, model.speed_start @ start, False)
