@@ -114,7 +114,8 @@ def horizon_model(
     matrices = ca.Function("matrices", [], parts)()
     taken = [np.ascontiguousarray(matrices[f"o{n}"].full()) for n in range(len(parts))]
     change = np.kron(np.eye(steps) - np.eye(steps, k=-1), np.eye(3))
-    return HorizonModel(steps, step_s, *taken, np.pad(change, ((0, 0), (0, steps))))
+    taken.append(np.pad(change, ((0, 0), (0, steps))))
+    return HorizonModel(steps, step_s, *taken)
 
 
 def track(
