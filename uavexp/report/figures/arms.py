@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _ACROSS = 4  # panels in a row
-_LABEL = 26  # characters in a line below a panel
+_LABEL = 22  # characters in a line below a panel
 
 
 def metric_panels(

@@ -37,7 +37,7 @@ def plans(study: Study, note: str) -> Drawing | None:
         axes = figure.add_subplot(1, len(flights), number + 1)
         inspection_view.draw(axes, world, log, views[number])
         seen = 100.0 * coverage.coverage_visible(log)
-        axes.set_title(f"{name}: {seen:.1f} % of the visible seen", fontsize=8)
+        axes.set_title(f"{name}: {seen:.2f} % of the visible seen", fontsize=8)
         axes.tick_params(labelsize=7)
         axes.set_xlabel("x [m]", fontsize=8)
         axes.set_ylabel("" if number else "y [m]", fontsize=8)
