@@ -77,7 +77,7 @@ def test_the_plans_are_of_the_first_and_the_last_arm(tmp_path: Path) -> None:
     drawings = {drawing.name: drawing for drawing in drawings_of(study_of(tmp_path / "study"))}
     titles = [axes.get_title() for axes in drawings["plans"].figure.axes]
     assert [title.split(":")[0] for title in titles] == ["static, seed 3", "both, seed 3"]
-    assert ["100.0 %" in titles[0], "50.0 %" in titles[1]] == [True, True]
+    assert ["100.00 %" in titles[0], "50.00 %" in titles[1]] == [True, True]
 
 
 def test_a_study_without_inspections_has_neither(tmp_path: Path) -> None:
