@@ -48,7 +48,7 @@ def run(*typed: str, **more: str) -> subprocess.CompletedProcess[str]:
 
 def records(folder: Path) -> dict[str, bytes]:
     """Record of every trial that stands in a study folder."""
-    trials = (folder / "trials").glob("*")
+    trials = (folder / "trials").glob("[!.]*")  # a hidden one was being written when the sweep was killed
     return {item.name: (item / "record.json").read_bytes() for item in trials if ".aside-" not in item.name}
 
 
