@@ -54,18 +54,15 @@ def measure(
     )
     _, travel_s = timed(lambda: travel_matrix(plan.lattice, plan.viewpoints.position_m))
     _, tour_s = timed(lambda: path_from(plan.start_travel_m, plan.travel_m, 0))
-    return (
-        plan,
-        field,
-        {
-            "field_s": field_s,
-            "surface_s": surface_s,
-            "plan_s": plan_s,
-            "of it travel_s": travel_s,
-            "of it tour_s": tour_s,
-            "total_s": field_s + surface_s + plan_s,
-        },
-    )
+    seconds = {
+        "field_s": field_s,
+        "surface_s": surface_s,
+        "plan_s": plan_s,
+        "of it travel_s": travel_s,
+        "of it tour_s": tour_s,
+        "total_s": field_s + surface_s + plan_s,
+    }
+    return plan, field, seconds
 
 
 def choosing_ms(plan: InspectionPlan, field: DistanceField) -> Float:

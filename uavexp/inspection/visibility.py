@@ -154,7 +154,7 @@ def _is_met(optics: Optics, eye: Float, point: Float, normal: Float) -> bool:
 
 @nb.njit(cache=True, inline="always")
 def half_turn(angle_rad: float) -> float:
-    """The same angle within [-pi, pi)."""
+    """The same angle within [-pi, pi): `geometry.wrap_angle` in less time, for 72 yaws of every cell."""
     return angle_rad - 2.0 * math.pi * math.floor(angle_rad / (2.0 * math.pi) + 0.5)
 
 

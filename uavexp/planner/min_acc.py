@@ -36,9 +36,9 @@ from functools import partial
 import numpy as np
 
 from uavexp.errors import require, require_non_negative, require_positive
-from uavexp.geometry import GRAVITY_MPS2, evaluate, sample_times
+from uavexp.geometry import evaluate, sample_times
 from uavexp.mapping.base import DistanceField
-from uavexp.planner.brake import braking_trajectory
+from uavexp.planner.brake import braking_trajectory, jerk_mps3
 from uavexp.planner.escape import safest_stop
 from uavexp.planner.optimise import CONTROL_POINTS, Settings, fixed_shortfall, moving_obstacles, optimise
 from uavexp.planner.search import Finder, PathSearch
@@ -129,7 +129,7 @@ class MinAcc:
             known_only=self.unknown == "conservative",
             max_speed=limits.max_speed_mps,
             max_acceleration=limits.max_acceleration_mps2,
-            max_jerk=GRAVITY_MPS2 * limits.max_body_rate_radps,
+            max_jerk=jerk_mps3(limits),
             body_radius=limits.body_radius_m,
             mover_margin=self.mover_margin_m,
             mover_horizon=self.mover_horizon_s,

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uavexp.geometry import GRAVITY_MPS2, evaluate, sample_times
-from uavexp.planner.brake import braking_trajectory
+from uavexp.geometry import evaluate, sample_times
+from uavexp.planner.brake import braking_trajectory, jerk_mps3
 from uavexp.planner.clearance import shortfall
 from uavexp.planner.free_space import free_space
 from uavexp.planner.smoothing.base import SmoothResult
@@ -88,8 +88,7 @@ def stop_and_go(path_m: Float, start_s: float, limits: Limits) -> Trajectory:
 
 def _durations(lengths_m: Float, limits: Limits) -> Float:
     """Least duration (K,) of each way, s."""
-    jerk = GRAVITY_MPS2 * limits.max_body_rate_radps
     by_speed = 15.0 / 8.0 * lengths_m / limits.max_speed_mps
     by_acceleration = np.sqrt(10.0 / math.sqrt(3.0) * lengths_m / limits.max_acceleration_mps2)
-    by_jerk = np.cbrt(60.0 * lengths_m / jerk)
+    by_jerk = np.cbrt(60.0 * lengths_m / jerk_mps3(limits))
     return np.asarray(np.maximum(by_speed, np.maximum(by_acceleration, by_jerk)))
