@@ -128,6 +128,38 @@ def test_children_die_with_a_supervisor_that_is_killed(deed: str, tmp_path: Path
     assert noted(tmp_path) == children, "no other was started"
 
 
+_INTERRUPTED = """
+import os, signal, time
+from multiprocessing import forkserver
+from tests.unit.test_sweep_local import *
+
+def connect(fds):
+    pair = _connect(fds)
+    os.kill(os.getpid(), signal.SIGINT)
+    time.sleep(0.2)
+    return pair
+
+_connect, forkserver.connect_to_new_process = forkserver.connect_to_new_process, connect
+try:
+    run(jobs(("sleep", 60.0)), n_jobs=int(sys.argv[1]))
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+
+
+@pytest.mark.parametrize("n_jobs", [1, 2])
+def test_an_interrupt_finds_no_child_half_begun(n_jobs: int) -> None:
+    variables = {**os.environ, "PYTHONPATH": str(PACKAGE.parent)}
+    ended = subprocess.run(
+        [sys.executable, "-c", _INTERRUPTED, str(n_jobs)],
+        env=variables,
+        capture_output=True,
+        text=True,
+        timeout=30,
+    )
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "interrupted\n", "")
+
+
 @pytest.mark.parametrize("values", [{"timeout_s": 0.0}, {"memory_mb": -1.0}, {"timeout_s": float("inf")}])
 def test_limits_must_be_positive_and_finite(values: dict[str, float]) -> None:
     with pytest.raises(ConfigError, match="must be > 0 and finite"):

@@ -17,6 +17,7 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Generator, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from multiprocessing import forkserver
 from multiprocessing.connection import Connection, wait
@@ -90,6 +91,9 @@ class _Supervisor:
     # multiprocessing's bookkeeping of children is not made for threads: two that poll one child
     # at the same time may both take its exit code, and one gets a wrong one
     _lock: threading.Lock = field(default_factory=threading.Lock)
+    # an interrupt is raised in the main thread, where joblib runs the jobs when they go one at a
+    # time; here it finds no child half begun
+    _starter: ThreadPoolExecutor = field(default_factory=lambda: ThreadPoolExecutor(max_workers=1))
     _living: set[ForkServerProcess] = field(default_factory=set)
     _stopped: bool = False
 
@@ -111,7 +115,7 @@ class _Supervisor:
 
     def _answer(self, job: Job, errors: IO[bytes]) -> Answer:
         deadline_s = time.monotonic() + self.limits.timeout_s
-        started = self._start(job, errors)
+        started = self._starter.submit(self._start, job, errors).result()
         if started is None:
             return Answer(status=Status.KILLED, reason="the sweep was stopped")
         child, connection = started
