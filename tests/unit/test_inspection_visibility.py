@@ -21,6 +21,7 @@ from uavexp.inspection.visibility import (
     visible_cells,
     witnesses,
 )
+from uavexp.types import Float
 
 ROOM = empty((6.0, 6.0, 3.0))
 box(ROOM, (3.0, 0.0, 0.0), (3.2, 4.0, 3.0))
@@ -36,6 +37,18 @@ def cells(points: list[list[float]], normals: list[list[float]]) -> Surface:
         area_m2=np.ones(len(points)),
         curvature=np.zeros(len(points)),
     )
+
+
+def sighted(camera: Camera, eye: Float, surface: Surface) -> list[int]:
+    """Cells that some yaw sees."""
+    every = np.ones(len(surface), dtype=np.bool_)
+    return sighted_cells(GRID, camera.optics, eye, surface.point_m, surface.normal, every).tolist()
+
+
+def visible(camera: Camera, eye: Float, yaw: float, surface: Surface) -> list[int]:
+    """Cells that a yaw sees."""
+    every = np.ones(len(surface), dtype=np.bool_)
+    return visible_cells(GRID, camera.optics, eye, yaw, surface.point_m, surface.normal, every).tolist()
 
 
 def test_sight_agrees_with_dense_samples_of_the_line() -> None:
@@ -77,17 +90,17 @@ def test_range_angle_and_walls_decide_what_is_seen(
 ) -> None:
     surface = cells([point], [normal])
     camera = Camera(max_range_m=5.0, horizontal_fov_rad=math.radians(130.0))
-    found = visible_cells(GRID, camera.optics, EYE, 0.0, surface.point_m, surface.normal)
+    found = visible(camera, EYE, 0.0, surface)
     assert (len(found) == 1) == seen
-    short = visible_cells(GRID, Camera(max_range_m=0.5).optics, EYE, 0.0, surface.point_m, surface.normal)
+    short = visible(Camera(max_range_m=0.5), EYE, 0.0, surface)
     assert len(short) == 0
 
 
 def test_incidence_has_a_limit() -> None:
     surface = cells([[3.0, 3.9, 1.51]], [[-1.0, 0.0, 0.0]])  # met at 51.6°
     for limit, seen in ((51.0, 0), (52.5, 1)):
-        optics = Camera(max_incidence_rad=math.radians(limit)).optics
-        assert len(sighted_cells(GRID, optics, EYE, surface.point_m, surface.normal)) == seen
+        camera = Camera(max_incidence_rad=math.radians(limit))
+        assert len(sighted(camera, EYE, surface)) == seen
 
 
 def wall_cells() -> Surface:
@@ -97,11 +110,11 @@ def wall_cells() -> Surface:
 
 
 def test_what_some_yaw_sees_is_the_union_over_yaws_that_fit_the_height() -> None:
-    surface, optics = wall_cells(), Camera().optics
+    surface, camera = wall_cells(), Camera()
     union: set[int] = set()
     for yaw in np.linspace(-np.pi, np.pi, 720):
-        union |= set(visible_cells(GRID, optics, EYE, float(yaw), surface.point_m, surface.normal).tolist())
-    assert union == set(sighted_cells(GRID, optics, EYE, surface.point_m, surface.normal).tolist())
+        union |= set(visible(camera, EYE, float(yaw), surface))
+    assert union == set(sighted(camera, EYE, surface))
 
 
 def test_views_and_witnesses_are_those_of_single_cameras() -> None:
@@ -110,10 +123,10 @@ def test_views_and_witnesses_are_those_of_single_cameras() -> None:
     yaws = np.array([0.3, -0.4, 3.0])
     views = views_of(GRID, camera, eyes, yaws, surface.point_m, surface.normal)
     for n in range(3):
-        alone = visible_cells(GRID, camera.optics, eyes[n], yaws[n], surface.point_m, surface.normal)
+        alone = visible(camera, eyes[n], yaws[n], surface)
         assert np.array_equal(views.of(n), alone)
     witness = witnesses(GRID, camera.optics, eyes, surface.point_m, surface.normal)
-    sets = [set(sighted_cells(GRID, camera.optics, eye, surface.point_m, surface.normal)) for eye in eyes]
+    sets = [set(sighted(camera, eye, surface)) for eye in eyes]
     for cell, first in enumerate(witness):
         assert first == next((n for n in range(3) if cell in sets[n]), -1)
 
@@ -123,13 +136,23 @@ def test_the_chosen_yaw_is_the_best_of_all() -> None:
     weight = np.random.default_rng(102).random(len(surface))
     choice = choose_yaw(GRID, camera, surface, weight, EYE, 0.2, candidates=24)
     totals = [
-        weight[visible_cells(GRID, camera.optics, EYE, 0.2 + turn, surface.point_m, surface.normal)].sum()
-        for turn in np.arange(24) * 2.0 * np.pi / 24
+        weight[visible(camera, EYE, 0.2 + turn, surface)].sum() for turn in np.arange(24) * 2.0 * np.pi / 24
     ]
     assert choice.score == pytest.approx(max(totals))
     assert choice.yaw_rad == pytest.approx(
         math.remainder(0.2 + np.argmax(totals) * 2.0 * np.pi / 24, 2.0 * np.pi)
     )
+
+
+def test_only_what_is_sought_is_found() -> None:
+    surface, camera = wall_cells(), Camera()
+    sought = np.random.default_rng(103).random(len(surface)) < 0.5
+    geometry = (surface.point_m, surface.normal, sought)
+    found = sighted_cells(GRID, camera.optics, EYE, *geometry)
+    assert found.tolist() == [n for n in sighted(camera, EYE, surface) if sought[n]]
+    framed = visible_cells(GRID, camera.optics, EYE, 0.3, *geometry)
+    assert 0 < len(framed) < len(found)
+    assert framed.tolist() == [n for n in visible(camera, EYE, 0.3, surface) if sought[n]]
 
 
 def test_with_nothing_to_see_the_nominal_yaw_stays() -> None:

@@ -95,12 +95,11 @@ def choose_yaw(
         candidates: yaws over 360°, evenly spaced, the nominal one among them.
     """
     require(candidates >= 1, f"candidates must be >= 1, got {candidates}")
-    worth = np.flatnonzero(weight > 0.0)  # no ray is cast to what is worth nothing
-    position, point_m = np.ascontiguousarray(position_m, dtype=np.float64), surface.point_m[worth]
-    seen = sighted_cells(grid, camera.optics, position, point_m, surface.normal[worth])
+    position, point_m = np.ascontiguousarray(position_m, dtype=np.float64), surface.point_m
+    seen = sighted_cells(grid, camera.optics, position, point_m, surface.normal, weight > 0.0)
     turn = 2.0 * math.pi / candidates * _nearest_first(candidates)
     yaws = nominal_yaw_rad + turn
-    scores = _scores(camera.optics, position, yaws, point_m[seen], weight[worth][seen])
+    scores = _scores(camera.optics, position, yaws, point_m[seen], weight[seen])
     best = int(np.argmax(scores > scores.max() - 1e-9))
     yaw = math.remainder(nominal_yaw_rad + float(turn[best]), 2.0 * math.pi)
     return ViewAngle(yaw, float(scores[best]), scores)

@@ -179,7 +179,7 @@ def is_framed(optics: Optics, eye: Float, yaw: float, point: Float) -> bool:
 
 
 @nb.njit(cache=True)
-def sighted_cells(grid: Grid, optics: Optics, eye: Float, point: Float, normal: Float) -> Int32:
+def sighted_cells(grid: Grid, optics: Optics, eye: Float, point: Float, normal: Float, sought: Bool) -> Int32:
     """Cells, ascending, that a camera at `eye` (3,) sees with some yaw.
 
     Args:
@@ -188,24 +188,32 @@ def sighted_cells(grid: Grid, optics: Optics, eye: Float, point: Float, normal: 
         eye: (3,).
         point: of the cells (N, 3).
         normal: of the cells (N, 3), towards free space.
+        sought: whether each cell (N,) is looked for.
     """
     found = np.empty(point.shape[0], dtype=np.int32)
     count = 0
     for n in range(point.shape[0]):
-        if _is_met(optics, eye, point[n], normal[n]) and is_clear(grid, eye, point[n], optics.tolerance_m):
+        if (
+            sought[n]
+            and _is_met(optics, eye, point[n], normal[n])
+            and is_clear(grid, eye, point[n], optics.tolerance_m)
+        ):
             found[count] = n
             count += 1
     return found[:count].copy()
 
 
 @nb.njit(cache=True)
-def visible_cells(grid: Grid, optics: Optics, eye: Float, yaw: float, point: Float, normal: Float) -> Int32:
+def visible_cells(
+    grid: Grid, optics: Optics, eye: Float, yaw: float, point: Float, normal: Float, sought: Bool
+) -> Int32:
     """Cells, ascending, that a camera at `eye` sees with yaw `yaw`; arguments as `sighted_cells`."""
     found = np.empty(point.shape[0], dtype=np.int32)
     count = 0
     for n in range(point.shape[0]):
         if (
-            _is_met(optics, eye, point[n], normal[n])
+            sought[n]
+            and _is_met(optics, eye, point[n], normal[n])
             and is_framed(optics, eye, yaw, point[n])
             and is_clear(grid, eye, point[n], optics.tolerance_m)
         ):
@@ -220,8 +228,9 @@ def _views(
 ) -> tuple[Int, Int32]:
     starts = np.zeros(eyes.shape[0] + 1, dtype=np.int64)
     cells = np.empty(1024, dtype=np.int32)
+    sought = np.ones(point.shape[0], dtype=np.bool_)
     for view in range(eyes.shape[0]):
-        seen = visible_cells(grid, optics, eyes[view], yaws[view], point, normal)
+        seen = visible_cells(grid, optics, eyes[view], yaws[view], point, normal, sought)
         begin, end = starts[view], starts[view] + seen.shape[0]
         while end > cells.shape[0]:
             cells = np.concatenate((cells, np.empty_like(cells)))

@@ -36,11 +36,11 @@ class Coverage:
 
     def look(self, scene: Scene, time_s: float, eye_m: Float, yaw_rad: float) -> None:
         """Count what the camera sees now; movers block sight like everything else."""
-        waiting = np.flatnonzero(np.isinf(self.seen_s))
-        point, normal = self.surface.point_m[waiting], self.surface.normal[waiting]
-        framed = visible_cells(_NOTHING, self.camera.optics, eye_m, yaw_rad, point, normal)
+        point, normal = self.surface.point_m, self.surface.normal
+        unseen = np.isinf(self.seen_s)
+        framed = visible_cells(_NOTHING, self.camera.optics, eye_m, yaw_rad, point, normal, unseen)
         met = is_met(scene, eye_m, point[framed], normal[framed], self.tolerance_m)
-        self.seen_s[waiting[framed[met]]] = time_s
+        self.seen_s[framed[met]] = time_s
 
 
 def is_met(scene: Scene, eye_m: Float, point_m: Float, normal: Float, tolerance_m: float) -> Bool:

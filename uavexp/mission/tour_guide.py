@@ -306,12 +306,12 @@ class TourGuide:
 
     def _newly_seen(self, observation: Observation, yaw_rad: float) -> Bool:
         """Cells (N,) not yet scanned that the camera would see from here with a yaw, by the live map."""
-        surface, left = self.plan.surface, np.flatnonzero(~self.scanned)
-        eye_m = np.ascontiguousarray(observation.state.position_m)
+        surface, eye_m = self.plan.surface, np.ascontiguousarray(observation.state.position_m)
         grid, optics = live_grid(observation.field), self.camera.optics
-        seen = visible_cells(grid, optics, eye_m, yaw_rad, surface.point_m[left], surface.normal[left])
         new = np.zeros(len(surface), dtype=np.bool_)
-        new[left[seen]] = True
+        new[visible_cells(grid, optics, eye_m, yaw_rad, surface.point_m, surface.normal, ~self.scanned)] = (
+            True
+        )
         return new
 
     def _scan(self, observation: Observation) -> None:
