@@ -95,6 +95,18 @@ def test_a_step_aside_that_is_under_way_is_not_changed_for_one_hardly_better() -
     assert chosen[0] in sides.tolist()
 
 
+def test_staying_is_staying_where_the_vehicle_is_meant_to_be() -> None:
+    """A hold at where the vehicle finds itself would run away with its error."""
+    _, guide = begun(rounds=0)
+    guide.reset(1.2, LIMITS)
+    far = walking((np.array([5.4, 3.5]), np.zeros(2)))
+    here = START_M + np.array([0.0, 0.0, 0.4])
+    for error_m in ([0.1, -0.05, 0.08], [-0.1, 0.1, 0.0], [0.0, 0.0, 0.2]):
+        seen = among(far, 0.0, here + np.array(error_m))
+        seen = replace(seen, reference=replace(seen.reference, position_m=here))
+        np.testing.assert_array_equal(guide._place_m(0, seen, lambda _: False), here)
+
+
 def test_over_the_head_of_who_comes_is_a_place_to_step_aside_to() -> None:
     _, guide = begun(rounds=0)
     corner = np.array([0.45, 0.45, 1.2])

@@ -70,7 +70,7 @@ def aside_m(
     Args:
         tracks: the movers.
         field: the live map.
-        from_m: (3,) where the vehicle is.
+        from_m: (3,) where the vehicle is meant to be: a hold that follows its own error runs away with it.
         places_m: (N, 3) that may be gone to.
         keep_m: room that is wanted.
         limits: of the vehicle.

@@ -220,7 +220,7 @@ class TourGuide:
         self._aside_m = aside_m(
             observation.tracks,
             observation.field,
-            observation.state.position_m,
+            observation.reference.position_m,
             self._refuges_m(observation),
             limits.body_radius_m + self.keep_m,
             limits,
