@@ -180,7 +180,7 @@ def is_framed(optics: Optics, eye: Float, yaw: float, point: Float) -> bool:
 
 @nb.njit(cache=True)
 def sighted_cells(grid: Grid, optics: Optics, eye: Float, point: Float, normal: Float, sought: Bool) -> Int32:
-    """Cells, ascending, that a camera at `eye` (3,) sees with some yaw.
+    """Of the cells looked for, those that a camera at `eye` (3,) sees with some yaw, ascending.
 
     Args:
         grid: what blocks sight.
@@ -207,7 +207,7 @@ def sighted_cells(grid: Grid, optics: Optics, eye: Float, point: Float, normal: 
 def visible_cells(
     grid: Grid, optics: Optics, eye: Float, yaw: float, point: Float, normal: Float, sought: Bool
 ) -> Int32:
-    """Cells, ascending, that a camera at `eye` sees with yaw `yaw`; arguments as `sighted_cells`."""
+    """Of the cells looked for, those that a camera at `eye` sees with yaw `yaw`, as `sighted_cells`."""
     found = np.empty(point.shape[0], dtype=np.int32)
     count = 0
     for n in range(point.shape[0]):

@@ -135,7 +135,7 @@ class _Supervisor:
             child = context.Process(target=run_child, args=arguments, daemon=True)
             child.start()
             self._living.add(child)
-        with contextlib.suppress(OSError):  # it is dead already
+        with contextlib.suppress(OSError, ValueError):  # it is dead already, or its job was given up
             send_handle(ours, errors.fileno(), child.pid)
         return child, ours
 
