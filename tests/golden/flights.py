@@ -1,0 +1,83 @@
+"""Golden flights: short flights of every kind of part, each held to the digest of its log.
+
+    make golden        flies them and keeps what they left in digests.json
+
+A change of structure leaves every digest alone. A change of numbers makes them anew and names the
+flights and the reason in CHANGELOG. A digest is over the log's arrays, byte for byte; that holds on one
+lock file and one family of processors, so libraries that choose their kernels by the processor are held
+to what every x86-64 with AVX2 has. Beside it stand a few figures of the flight, to tell what moved.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+DIGESTS = Path(__file__).with_name("digests.json")
+# libraries read these when they load
+PROCESSOR = {
+    "NPY_DISABLE_CPU_FEATURES": "AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL AVX512_SPR",
+    "OPENBLAS_CORETYPE": "Haswell",
+}
+COLUMNS = {"world": "random_columns", "world.size_m": [8.0, 6.0, 2.6], "world.density_per_m2": 0.15}
+ROOMS = {"world": "rooms", "world.size_m": [8.0, 6.0, 2.6]}
+FOUR_MOVERS = {"movers": "mixed", "movers.count": 4}
+FLIGHTS: dict[str, dict[str, Any]] = {
+    "mcr": {**ROOMS, "strategy": "mcr"},
+    "mcr_literal": {**COLUMNS, "strategy": "mcr_literal", "unknown": "conservative"},
+    "tbr": {**COLUMNS, "strategy": "tbr", "trigger.interval_s": 1.0, "safety": "brake"},
+    "ssp": {**ROOMS, "strategy": "ssp", "stuck_s": 3.0},
+    "other_triggers": {**COLUMNS, "strategy": "frontier_covered", "mapping": "voxel_block_grid"},
+    "collision_check": {**ROOMS, "strategy": "collision_check", "estimator": "drift", "vehicle": "point_mass"},
+    "distance": {**COLUMNS, "strategy": "distance", "sensor": "lidar_rosette", "planner": "astar"},
+    "expiry": {**COLUMNS, "strategy": "expiry", "mapping": "known", "planner": "rrtstar"},
+    "risk": {**COLUMNS, **FOUR_MOVERS, "strategy": "risk", "planner": "improved_astar"},
+    "bspline_qp": {**COLUMNS, **FOUR_MOVERS, "planner": "bspline_qp", "detection": "noisy"},
+    "bspline_mpc": {**COLUMNS, **FOUR_MOVERS, "strategy": "bspline_mpc", "detection": "truth"},
+    "df_bitstar": {**ROOMS, "planner": "df_bitstar", "controller": "flatness"},
+    "bitstar": {**COLUMNS, "planner": "bitstar", "world_seed": 5},
+    "explore": {**ROOMS, "mission": "explore", "world.size_m": [6.0, 4.5, 2.6], "mission.time_base_s": 20.0},
+    "inspect": {
+        **ROOMS, "strategy": "inspect", "mission.blocks": 1, "world.size_m": [6.0, 4.6, 2.6],
+        "mission.time_base_s": 10.0, "mission.time_per_viewpoint_s": 0.0, "mission.time_per_path_spm": 0.0,
+    },
+}  # fmt: skip
+
+
+def fly() -> dict[str, dict[str, Any]]:
+    """Fly every one of `FLIGHTS`; the digest of each log, and what tells a person what moved."""
+    import uavexp
+    from uavexp.logs import arrays_digest, log_arrays
+
+    found = {}
+    for name, values in FLIGHTS.items():
+        begin_s = time.perf_counter()
+        trial = uavexp.fly(**{"seed": 1, **values})
+        found[name] = {
+            "digest": arrays_digest(log_arrays(trial.log)),
+            "outcome": str(trial.log.outcome),
+            "end_s": round(float(trial.log.time_s[-1]), 6),
+            "plans": len(trial.log.replans),
+            "path_m": round(float(trial.metrics["path_length_m"]), 6),
+        }
+        print(f"{name:<16} {time.perf_counter() - begin_s:4.1f} s  {found[name]}", file=sys.stderr)
+    return found
+
+
+def fly_apart() -> dict[str, dict[str, Any]]:
+    """`fly`, in a process of its own that is held to one family of processors."""
+    flown = subprocess.run(
+        [sys.executable, "-m", "tests.golden.flights"],
+        env={**os.environ, **PROCESSOR}, stdout=subprocess.PIPE, check=True, cwd=Path(__file__).parents[2],
+    )  # fmt: skip
+    found: dict[str, dict[str, Any]] = json.loads(flown.stdout)
+    return found
+
+
+if __name__ == "__main__":
+    print(json.dumps(fly()))

@@ -1,0 +1,26 @@
+"""Flights are what they were, byte for byte."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+
+from tests.golden.flights import DIGESTS, FLIGHTS, fly_apart
+
+KEPT = json.loads(DIGESTS.read_text(encoding="utf-8"))
+
+
+@pytest.fixture(scope="module")
+def flown() -> dict[str, dict[str, Any]]:
+    return fly_apart()
+
+
+def test_every_flight_has_its_digest() -> None:
+    assert list(KEPT) == list(FLIGHTS)
+
+
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_flight_is_what_it_was(flown: dict[str, dict[str, Any]], name: str) -> None:
+    assert flown[name] == KEPT[name], "a change of numbers? name it in CHANGELOG, then: make golden"
