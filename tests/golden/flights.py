@@ -32,8 +32,10 @@ FLIGHTS: dict[str, dict[str, Any]] = {
     "mcr_literal": {**COLUMNS, "strategy": "mcr_literal", "unknown": "conservative"},
     "tbr": {**COLUMNS, "strategy": "tbr", "trigger.interval_s": 1.0, "safety": "brake"},
     "ssp": {**ROOMS, "strategy": "ssp", "stuck_s": 3.0},
-    "other_triggers": {**COLUMNS, "strategy": "frontier_covered", "mapping": "voxel_block_grid"},
-    "collision_check": {**ROOMS, "strategy": "collision_check", "estimator": "drift", "vehicle": "point_mass"},
+    "frontier_covered": {**COLUMNS, "strategy": "frontier_covered", "mapping": "voxel_block_grid"},
+    "collision_check": {
+        **ROOMS, "strategy": "collision_check", "estimator": "drift", "vehicle": "point_mass",
+    },
     "distance": {**COLUMNS, "strategy": "distance", "sensor": "lidar_rosette", "planner": "astar"},
     "expiry": {**COLUMNS, "strategy": "expiry", "mapping": "known", "planner": "rrtstar"},
     "risk": {**COLUMNS, **FOUR_MOVERS, "strategy": "risk", "planner": "improved_astar"},
