@@ -24,9 +24,9 @@ from uavexp.metrics.voxel_path import (
     height_reversals,
     mean_heading_change_rad,
 )
+from uavexp.planner.find.voxel.grid import VoxelGrid, VoxelPath
+from uavexp.planner.find.voxel.smoothing import smoothed
 from uavexp.planner.improved_astar import ImprovedAstar
-from uavexp.planner.voxel.grid import VoxelGrid, VoxelPath
-from uavexp.planner.voxel.smoothing import smoothed
 from uavexp.seeding import Stream, generator
 from uavexp.world.multilevel import Multilevel
 from uavexp.world.voxel_model import inflate, voxel_model

@@ -50,7 +50,7 @@ def office() -> dict[str, Any] | None:
 def fly(overrides: dict[str, Any]) -> dict[str, Any]:
     """The same flight twice, the second one timed: laps in ms, wall and flown time, memory."""
     import uavexp
-    from uavexp.build import build
+    from uavexp.config.build import build
     from uavexp.trial import fly_trial
 
     trial = uavexp.fly(strategy="mcr", seed=0, **overrides)

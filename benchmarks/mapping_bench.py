@@ -13,15 +13,17 @@ import time
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
+from uavexp.arrays import Float
+from uavexp.field import OCCUPIED
 from uavexp.geometry import quaternion_from_yaw
-from uavexp.mapping.base import OCCUPIED, MapBackend
+from uavexp.mapping.base import MapBackend
 from uavexp.mapping.dense import Dense
 from uavexp.mapping.projection import project
 from uavexp.mapping.voxel_block_grid import VoxelBlockGrid
 from uavexp.scene import Scene
 from uavexp.seeding import Stream, generator
 from uavexp.sensor.rgbd import Rgbd
-from uavexp.types import DepthScan, Float, State, World
+from uavexp.types import DepthScan, State, World
 from uavexp.world.warehouse import Warehouse
 
 SPEED_MPS = 1.2

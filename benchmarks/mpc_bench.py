@@ -15,11 +15,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tests.fields import bounds, empty, field_from
-from uavexp.geometry import evaluate
-from uavexp.mapping.base import DistanceField
+from uavexp.arrays import Float
+from uavexp.field import DistanceField
 from uavexp.planner.bspline_mpc import BsplineMpc
-from uavexp.planner.moving import MovingObstacles
-from uavexp.types import Float, Goal, Limits, PlanRequest, Tracks
+from uavexp.planner.movers.moving import MovingObstacles
+from uavexp.trajectory import evaluate
+from uavexp.types import Goal, Limits, PlanRequest, Tracks
 
 LIMITS = Limits(
     max_speed_mps=2.5, max_acceleration_mps2=2.5, max_body_rate_radps=2.0, body_size_m=(0.32, 0.32, 0.12)

@@ -10,8 +10,9 @@ import gc
 import numpy as np
 
 from tests.fields import bounds, field_from, warehouse
-from uavexp.geometry import evaluate, polyline_length_m
+from uavexp.geometry import polyline_length_m
 from uavexp.planner.min_acc import MinAcc
+from uavexp.trajectory import evaluate
 from uavexp.types import Goal, Limits, PlanRequest, PlanResult, PlanStatus
 
 LIMITS = Limits(

@@ -19,8 +19,8 @@ from pyarrow import parquet
 from rich.console import Console
 
 from uavexp.report.make import findings, make_report
-from uavexp.study import STUDY, read_study
-from uavexp.table import FIRST_OF_REPLANS, REPLANS, TABLE
+from uavexp.store.study import STUDY, read_study
+from uavexp.store.table import FIRST_OF_REPLANS, REPLANS, TABLE
 
 ARMS = ("SSP", "TBR", "TBR frequent", "MCR", "MCR literal")
 SCENES = tuple(f"scene {number}" for number in range(10))

@@ -20,13 +20,14 @@ from typing import Any
 import numpy as np
 
 from tests.components import build
-from uavexp.geometry import evaluate, polyline_length_m
+from uavexp.geometry import polyline_length_m
 from uavexp.mapping.known import Known
 from uavexp.planner.df_bitstar import DfBitstar
-from uavexp.planner.free_space import free_space
-from uavexp.planner.ompl_process import Query, search_with_ompl
+from uavexp.planner.find.free_space import free_space
+from uavexp.planner.find.ompl_process import Query, search_with_ompl
 from uavexp.scene import Scene
 from uavexp.seeding import Stream, generator
+from uavexp.trajectory import evaluate
 from uavexp.types import Goal, Limits, PlanRequest, PlanResult
 
 LIMITS = Limits(

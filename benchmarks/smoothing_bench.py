@@ -14,16 +14,18 @@ from functools import partial
 import numpy as np
 
 from tests.fields import bounds, field_from, warehouse
-from uavexp.geometry import evaluate, polyline_length_m
-from uavexp.planner.free_space import FreeSpace, free_space
-from uavexp.planner.search import PathSearch
-from uavexp.planner.smoothing.basis import make_basis
-from uavexp.planner.smoothing.bspline_qp import BsplineSmoother, Derivative
-from uavexp.planner.smoothing.corridor import make_corridor
-from uavexp.planner.smoothing.quadratic import NO_CUTS, Problem, Solution, solve
-from uavexp.planner.smoothing.shortcut import shortcut
-from uavexp.planner.timing import resample, smooth, time_profile
-from uavexp.types import Float, Goal, Limits, PlanRequest, PlanStatus
+from uavexp.arrays import Float
+from uavexp.geometry import polyline_length_m
+from uavexp.planner.find.free_space import FreeSpace, free_space
+from uavexp.planner.find.grid import PathSearch
+from uavexp.planner.shape.corridor import make_corridor
+from uavexp.planner.shape.corridor_qp import BsplineSmoother, Derivative
+from uavexp.planner.shape.quadratic import NO_CUTS, Problem, Solution, solve
+from uavexp.planner.shape.shortcut import shortcut
+from uavexp.planner.shape.timing import resample, smooth, time_profile
+from uavexp.planner.spline.clamped import make_basis
+from uavexp.trajectory import evaluate
+from uavexp.types import Goal, Limits, PlanRequest, PlanStatus
 
 LIMITS = Limits(
     max_speed_mps=5.0, max_acceleration_mps2=3.5, max_body_rate_radps=2.0, body_size_m=(0.32, 0.32, 0.12)

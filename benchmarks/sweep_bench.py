@@ -13,12 +13,12 @@ from pathlib import Path
 
 from rich.console import Console
 
-from uavexp.cli.composition import Composer
-from uavexp.cli.job import fly_task
-from uavexp.cli.overrides import parse_settings
-from uavexp.cli.plan import plan_of
+from uavexp.config.composition import Composer
+from uavexp.config.overrides import parse_settings
 from uavexp.sweep.job import Job, Limits
 from uavexp.sweep.local import run_local, start_fork_server
+from uavexp.sweep.plan import plan_of
+from uavexp.sweep.task import fly_task
 
 SEEDS = "0:8"
 LIMITS = Limits(timeout_s=600.0, memory_mb=4096.0)
@@ -45,7 +45,7 @@ def main() -> None:
     command = Composer().command(parse_settings(["strategy=mcr", f"seed={SEEDS}"]))
     with tempfile.TemporaryDirectory() as folder:
         jobs = list(plan_of(command, Path(folder)).jobs)
-    start_fork_server(["uavexp.cli.preload"])
+    start_fork_server(["uavexp.sweep.preload"])
     here(jobs[0]), seconds(jobs[:1], 1)  # first calls are not measurements
     ratios = [seconds([job], 1) / here(job) for job in jobs]
     median = statistics.median(ratios)

@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from uavexp.arrays import Float
+from uavexp.field import DistanceField
 from uavexp.inspection import clusters as runs
 from uavexp.inspection.plan import InspectionPlan, Settings, path_from, plan_inspection
 from uavexp.inspection.reference import reference_field, surface_of_mesh
@@ -20,9 +22,8 @@ from uavexp.inspection.travel import travel_matrix
 from uavexp.inspection.view_angle import choose_yaw
 from uavexp.inspection.viewpoints import Pattern
 from uavexp.inspection.visibility import Camera
-from uavexp.mapping.base import DistanceField
 from uavexp.mission.more_stops import live_grid
-from uavexp.types import Float, World
+from uavexp.types import World
 from uavexp.world.rooms import Rooms
 
 SIZES = {250: (22.0, 14.0), 500: (30.0, 20.0), 1000: (42.0, 28.0), 2000: (58.0, 40.0)}  # viewpoints: floor, m

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from tests.fields import box, empty, field_from
-from uavexp.mapping.base import DistanceField
-from uavexp.types import Bodies, Float, RayScan, Shape
+from uavexp.arrays import Float
+from uavexp.field import DistanceField
+from uavexp.types import Bodies, RayScan, Shape
 
 SIZE_M = (8.0, 6.0, 3.0)
 WALLS = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from uavexp.mapping.base import OCCUPIED, UNKNOWN
+from uavexp.field import OCCUPIED, UNKNOWN
 from uavexp.mapping.esdf import SignedDistance, distance_table
 from uavexp.types import MapUpdate
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from uavexp.mapping.base import FREE, OCCUPIED, UNKNOWN, DistanceField
-from uavexp.types import Bool, Float
+from uavexp.arrays import Bool, Float
+from uavexp.field import FREE, OCCUPIED, UNKNOWN, DistanceField
 
 
 def field_from(

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from uavexp.arrays import Float, Float32, Int32
+from uavexp.field import DistanceField
 from uavexp.inspection.reference import Surface, reference_field, surface_of_mesh
-from uavexp.mapping.base import DistanceField
-from uavexp.types import Float, Float32, Int32
 
 START_M = np.array([1.03, 1.02, 1.21])
 

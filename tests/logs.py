@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from uavexp.types import Difficulty, Float, Int32, Outcome, PlanStatus, Replan, TrialLog, World
+from uavexp.arrays import Float, Int32
+from uavexp.types import Difficulty, Outcome, PlanStatus, Replan, TrialLog, World
 
 Curve = Callable[[Float], Float]  # times (T,) -> (T, 3)
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from uavexp.types import DepthScan, Float, RayScan
+from uavexp.arrays import Float
+from uavexp.types import DepthScan, RayScan
 
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]  # lower and upper corner, m
 

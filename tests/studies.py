@@ -10,11 +10,12 @@ from typing import Any
 import pandas as pd
 import pytest
 
+from tests.folders import DATA
 from uavexp.__main__ import main
-from uavexp.study import STUDY, Study, read_study
-from uavexp.table import REPLANS, TABLE, write_table
+from uavexp.store.study import STUDY, Study, read_study
+from uavexp.store.table import REPLANS, TABLE, write_table
 
-STORED = Path(__file__).parent / "data" / "study"
+STORED = DATA / "study"
 _SMALL = (
     "experiments=mcr/table1",
     "arm=SSP,TBR,MCR",

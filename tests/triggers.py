@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from tests.fields import box, empty, field_from
-from uavexp.mapping.base import DistanceField
-from uavexp.types import Bool, Goal, Limits, MapUpdate, Observation, Reference, State, Trajectory
+from uavexp.arrays import Bool
+from uavexp.field import DistanceField
+from uavexp.trajectory import Trajectory
+from uavexp.types import Goal, Limits, MapUpdate, Observation, Reference, State
 
 LIMITS = Limits(
     max_speed_mps=2.5, max_acceleration_mps2=2.5, max_body_rate_radps=2.0, body_size_m=(0.32, 0.32, 0.12)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from uavexp.kernel_cache import LOCATOR, VARIABLE
 
 if TYPE_CHECKING:
-    from uavexp.cli.flight import Trial
+    from uavexp.flight import Trial
 
 __version__ = "0.1.0"
 
@@ -48,6 +48,6 @@ def fly(*overrides: str, **values: Any) -> Trial:
         ConfigError: a wrong key or value, or more than one cell or seed.
         WorldError: the world cannot be made or read.
     """
-    from uavexp.cli.flight import fly_overrides
+    from uavexp.flight import fly_overrides
 
     return fly_overrides(overrides, values)

@@ -48,7 +48,7 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 def _run(typed: Sequence[str]) -> int:
-    from uavexp.cli.options import user_folder
+    from uavexp.config.options import user_folder
 
     arguments = _parse(typed)
     folder = user_folder(arguments.config_dir) if arguments.config_dir is not None else None
@@ -65,15 +65,15 @@ def _run(typed: Sequence[str]) -> int:
         sys.stdout.write(info_text(folder))
         return 0
 
-    from uavexp.cli.overrides import parse_settings
+    from uavexp.config.overrides import parse_settings
 
     settings = parse_settings(arguments.overrides)
     if not arguments.cfg:
-        from uavexp.cli.head_start import give_head_start
+        from uavexp.sweep.head_start import give_head_start
 
         give_head_start(settings)
 
-    from uavexp.cli.composition import Composer
+    from uavexp.config.composition import Composer
 
     composer = Composer(user_folder=folder)
     command = composer.command(settings)
@@ -83,8 +83,8 @@ def _run(typed: Sequence[str]) -> int:
         sys.stdout.write(config_text(composer, command, arguments.cfg))
         return 0
 
-    from uavexp.cli.run import execute
     from uavexp.cli.terminal import Terminal
+    from uavexp.sweep.run import execute
 
     return execute(command, Terminal(), folder, typed)
 

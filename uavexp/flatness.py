@@ -24,8 +24,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numba as nb
 import numpy as np
 
-from uavexp.geometry import GRAVITY_MPS2, derivative, quaternion_from_rotation
-from uavexp.types import Float, Trajectory
+from uavexp.arrays import Float
+from uavexp.geometry import GRAVITY_MPS2, quaternion_from_rotation
+from uavexp.trajectory import Trajectory, derivative
 
 if TYPE_CHECKING:
     from uavexp.vehicle.quadrotor import Plant

@@ -1,4 +1,4 @@
-"""Rotations and trajectories as small pure functions on arrays.
+"""Rotations and polylines as small pure functions on arrays.
 
 Quaternions are (w, x, y, z), body to world. The numba kernels (names with a leading
 verb, arrays in and out) may be called from other kernels.
@@ -11,7 +11,7 @@ import math
 import numba as nb
 import numpy as np
 
-from uavexp.types import Float, Trajectory
+from uavexp.arrays import Float
 
 GRAVITY_MPS2 = 9.81
 
@@ -87,79 +87,6 @@ def yaw_of(q: Float) -> float:
 def wrap_angle(angle_rad: float) -> float:
     """The same angle in [-pi, pi)."""
     return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
-
-
-@nb.njit(cache=True)
-def evaluate_pieces(breaks_s: Float, coefficients: Float, times_s: Float) -> tuple[Float, Float, Float]:
-    """Position, velocity and acceleration (N, 3) of a `Trajectory`'s arrays at times (N,).
-
-    Before the first break: the start at rest; after the last: the end at rest.
-    """
-    count = times_s.shape[0]
-    pieces, terms, _ = coefficients.shape
-    position = np.zeros((count, 3))
-    velocity = np.zeros((count, 3))
-    acceleration = np.zeros((count, 3))
-    for n in range(count):
-        t = times_s[n]
-        clamped = min(max(t, breaks_s[0]), breaks_s[pieces])
-        k = min(max(np.searchsorted(breaks_s, clamped, side="right") - 1, 0), pieces - 1)
-        s = clamped - breaks_s[k]
-        moving = breaks_s[0] <= t <= breaks_s[pieces]
-        for axis in range(3):
-            p, v, a = 0.0, 0.0, 0.0
-            for j in range(terms - 1, -1, -1):  # Horner, with both derivatives
-                a = a * s + 2.0 * v
-                v = v * s + p
-                p = p * s + coefficients[k, j, axis]
-            position[n, axis] = p
-            if moving:
-                velocity[n, axis] = v
-                acceleration[n, axis] = a
-    return position, velocity, acceleration
-
-
-def evaluate(trajectory: Trajectory, times_s: Float) -> tuple[Float, Float, Float]:
-    """Position m, velocity m/s and acceleration m/s², each (N, 3), at absolute times (N,)."""
-    p, v, a = evaluate_pieces(trajectory.breaks_s, trajectory.coefficients, np.atleast_1d(times_s))
-    return p, v, a
-
-
-@nb.njit(cache=True)
-def differentiate_pieces(breaks_s: Float, coefficients: Float, times_s: Float, order: int) -> Float:
-    """The `order`-th derivative (N, 3) of a `Trajectory`'s arrays at times (N,).
-
-    Outside, as in `evaluate_pieces`: the ends, at rest.
-    """
-    pieces, terms, _ = coefficients.shape
-    out = np.zeros((times_s.shape[0], 3))
-    for n in range(times_s.shape[0]):
-        t = times_s[n]
-        clamped = min(max(t, breaks_s[0]), breaks_s[pieces])
-        if order > 0 and t != clamped:
-            continue
-        k = min(max(np.searchsorted(breaks_s, clamped, side="right") - 1, 0), pieces - 1)
-        s = clamped - breaks_s[k]
-        for j in range(terms - 1, order - 1, -1):  # Horner on coefficients times j! / (j - order)!
-            factor = 1.0
-            for i in range(order):
-                factor *= j - i
-            for axis in range(3):
-                out[n, axis] = out[n, axis] * s + factor * coefficients[k, j, axis]
-    return out
-
-
-def derivative(trajectory: Trajectory, times_s: Float, order: int) -> Float:
-    """Derivative of the position (N, 3), m/s^order, at absolute times (N,): 3 is jerk, 4 is snap."""
-    pieces = (trajectory.breaks_s, trajectory.coefficients)
-    value: Float = differentiate_pieces(*pieces, np.atleast_1d(times_s), order)
-    return value
-
-
-def sample_times(trajectory: Trajectory, from_s: float, step_s: float) -> Float:
-    """Times from max(from_s, start) to the end, `step_s` apart, the end included."""
-    begin = min(max(from_s, trajectory.start_s), trajectory.end_s)
-    return np.append(np.arange(begin, trajectory.end_s, step_s), trajectory.end_s)
 
 
 def polyline_length_m(points_m: Float) -> float:

@@ -14,27 +14,17 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from uavexp.arrays import Float, Int32
+from uavexp.braking import braking_trajectory, with_stop
 from uavexp.explorer.base import Explorer
-from uavexp.geometry import derivative, evaluate, sample_times, wrap_angle
+from uavexp.geometry import wrap_angle
 from uavexp.planner.base import Planner
-from uavexp.planner.brake import braking_trajectory, hover_before, with_stop
 from uavexp.recorder import Stopwatch
 from uavexp.safety.base import Safety
+from uavexp.trajectory import Trajectory, derivative, evaluate, hover_before, sample_times
 from uavexp.trigger.base import TriggerPolicy
 from uavexp.trigger.change import changed_near
-from uavexp.types import (
-    Float,
-    Goal,
-    Int32,
-    Limits,
-    Observation,
-    PlanRequest,
-    PlanResult,
-    PlanStatus,
-    Reference,
-    Replan,
-    Trajectory,
-)
+from uavexp.types import Goal, Limits, Observation, PlanRequest, PlanResult, PlanStatus, Reference, Replan
 
 _GOALS_FAULT = (PlanStatus.GOAL_BLOCKED, PlanStatus.NO_PATH, PlanStatus.NOT_CLEAR)  # another may do
 _NEAR_M, _CHANGED_M = 2.0, 0.15  # r_mon and delta_map of paper 1

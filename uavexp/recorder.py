@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 from scipy import ndimage
 
+from uavexp.arrays import Float
 from uavexp.bodies import distance_m
-from uavexp.mapping.base import OCCUPIED, DistanceField
+from uavexp.field import OCCUPIED, DistanceField
 from uavexp.scene import Scene
 from uavexp.trigger.validity import clearance_ahead_m
 from uavexp.types import (
     Bodies,
     Contact,
-    Float,
     Limits,
     Observation,
     Outcome,

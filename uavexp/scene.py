@@ -12,9 +12,10 @@ from typing import cast
 import numpy as np
 
 from uavexp import triangle_grid
+from uavexp.arrays import Float, Float32, Int, Int32
 from uavexp.bodies import cast_rays, distance_m, touching
 from uavexp.o3d import open3d
-from uavexp.types import Bodies, Float, Float32, Int, Int32, World
+from uavexp.types import Bodies, World
 
 _THREADS = 1  # records must not depend on the machine
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numba as nb
 import numpy as np
 
-from uavexp.types import Float, Float32, Int, Int32
+from uavexp.arrays import Float, Float32, Int, Int32
 
 CELL_M = 0.4  # about the size of a body, so that a query visits 8 to 27 cells
 MAX_CELLS = 4_000_000  # a larger world gets larger cells

@@ -11,27 +11,12 @@ import dataclasses
 import math
 from dataclasses import dataclass, field
 from enum import IntEnum, StrEnum
-from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
-if TYPE_CHECKING:
-    from uavexp.mapping.base import DistanceField
-
-Float = npt.NDArray[np.float64]
-Float32 = npt.NDArray[np.float32]
-Bool = npt.NDArray[np.bool_]
-Int = npt.NDArray[np.int64]
-Int32 = npt.NDArray[np.int32]
-UInt8 = npt.NDArray[np.uint8]
-
-
-def _check_shape(name: str, array: npt.NDArray[np.generic], shape: tuple[int | None, ...]) -> None:
-    if array.ndim != len(shape) or any(
-        want is not None and have != want for have, want in zip(array.shape, shape, strict=True)
-    ):
-        raise ValueError(f"{name} must have shape {shape}, got {array.shape}")
+from uavexp.arrays import Bool, Float, Float32, Int, Int32, UInt8, check_shape
+from uavexp.field import DistanceField
+from uavexp.trajectory import Trajectory
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,10 +29,10 @@ class State:
     body_rate_radps: Float  # (3,) body frame
 
     def __post_init__(self) -> None:
-        _check_shape("position_m", self.position_m, (3,))
-        _check_shape("velocity_mps", self.velocity_mps, (3,))
-        _check_shape("quaternion_wxyz", self.quaternion_wxyz, (4,))
-        _check_shape("body_rate_radps", self.body_rate_radps, (3,))
+        check_shape("position_m", self.position_m, (3,))
+        check_shape("velocity_mps", self.velocity_mps, (3,))
+        check_shape("quaternion_wxyz", self.quaternion_wxyz, (4,))
+        check_shape("body_rate_radps", self.body_rate_radps, (3,))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,43 +72,6 @@ class Limits:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Trajectory:
-    """Piecewise polynomial r(t), the common form of every planner's result.
-
-    On piece k, with s = t - breaks_s[k]: r(t) = sum_j coefficients[k, j] s**j.
-    Before the first break it stays at the start, after the last one it holds the end
-    position at rest (the vehicle holds at the end of a trajectory; METHODS.md paper 1).
-    """
-
-    breaks_s: Float  # (K+1,) increasing, absolute trial time
-    coefficients: Float  # (K, D+1, 3) ascending powers
-    at_rest: bool  # whether the end velocity is zero
-
-    def __post_init__(self) -> None:
-        pieces = self.breaks_s.shape[0] - 1
-        _check_shape("coefficients", self.coefficients, (pieces, None, 3))
-        if not (np.isfinite(self.breaks_s).all() and np.isfinite(self.coefficients).all()):
-            raise ValueError("trajectory must be finite")
-        if pieces < 1 or np.any(np.diff(self.breaks_s) <= 0.0):
-            raise ValueError("breaks_s must increase")
-
-    @property
-    def start_s(self) -> float:
-        """Time of the first break, s."""
-        return float(self.breaks_s[0])
-
-    @property
-    def end_s(self) -> float:
-        """Time of the last break, s."""
-        return float(self.breaks_s[-1])
-
-    @property
-    def duration_s(self) -> float:
-        """End minus start, s."""
-        return self.end_s - self.start_s
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class DepthScan:
     """One depth image with the pose it is believed to be taken from.
 
@@ -140,8 +88,8 @@ class DepthScan:
     camera_rotation: Float  # (3, 3) camera to world
 
     def __post_init__(self) -> None:
-        _check_shape("depth_m", self.depth_m, (None, None))
-        _check_shape("camera_rotation", self.camera_rotation, (3, 3))
+        check_shape("depth_m", self.depth_m, (None, None))
+        check_shape("camera_rotation", self.camera_rotation, (3, 3))
         if not (np.isfinite(self.camera_position_m).all() and np.isfinite(self.camera_rotation).all()):
             raise ValueError("camera pose must be finite")
         if abs(float(np.linalg.det(self.camera_rotation)) - 1.0) > 1e-6:
@@ -165,9 +113,9 @@ class RayScan:
     max_range_m: float
 
     def __post_init__(self) -> None:
-        _check_shape("origin_m", self.origin_m, (3,))
-        _check_shape("direction", self.direction, (None, 3))
-        _check_shape("range_m", self.range_m, (self.direction.shape[0],))
+        check_shape("origin_m", self.origin_m, (3,))
+        check_shape("direction", self.direction, (None, 3))
+        check_shape("range_m", self.range_m, (self.direction.shape[0],))
         if not np.isfinite(self.origin_m).all():
             raise ValueError("origin_m must be finite")
 
@@ -196,7 +144,7 @@ class Bodies:
     def __post_init__(self) -> None:
         count = len(self.shape)
         for name in ("half_size_m", "position_m", "velocity_mps"):
-            _check_shape(name, getattr(self, name), (count, 3))
+            check_shape(name, getattr(self, name), (count, 3))
 
     def __len__(self) -> int:
         return len(self.shape)
@@ -228,8 +176,8 @@ class Tracks:
     def __post_init__(self) -> None:
         count = len(self.identity)
         for name in ("position_m", "velocity_mps", "half_size_m"):
-            _check_shape(name, getattr(self, name), (count, 3))
-        _check_shape("covariance", self.covariance, (count, 6, 6))
+            check_shape(name, getattr(self, name), (count, 3))
+        check_shape("covariance", self.covariance, (count, 6, 6))
 
     def __len__(self) -> int:
         return len(self.identity)
@@ -398,9 +346,9 @@ class Surface:
     inspected: Bool  # (F,) whether the triangle is to be seen
 
     def __post_init__(self) -> None:
-        _check_shape("vertices_m", self.vertices_m, (None, 3))
-        _check_shape("triangles", self.triangles, (None, 3))
-        _check_shape("inspected", self.inspected, (self.triangles.shape[0],))
+        check_shape("vertices_m", self.vertices_m, (None, 3))
+        check_shape("triangles", self.triangles, (None, 3))
+        check_shape("inspected", self.inspected, (self.triangles.shape[0],))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

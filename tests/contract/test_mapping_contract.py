@@ -10,13 +10,15 @@ import pytest
 from omegaconf import OmegaConf
 
 from tests.exact_distance import exact_field
+from tests.folders import CONF
 from tests.scans import Box, take_scan
 from uavexp.errors import ConfigError, WorldError
-from uavexp.mapping.base import FREE, OCCUPIED, UNKNOWN, MapBackend
+from uavexp.field import FREE, OCCUPIED, UNKNOWN
+from uavexp.mapping.base import MapBackend
 from uavexp.mapping.parameters import MapParameters
 from uavexp.scene import Scene
 
-EVERY = sorted((Path(__file__).parents[2] / "conf" / "mapping").glob("*.yaml"))
+EVERY = sorted((CONF / "mapping").glob("*.yaml"))
 BOUNDS_M = np.array([[0.0, 0.0, 0.0], [8.0, 6.0, 3.0]])
 CAMERA_M = (0.55, 3.05, 1.45)
 WALL_M = 3.0  # x of the near face

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from uavexp.build import (
+from uavexp.config.build import (
     GROUPS,
     TARGET,
     TOP_LEVEL,
@@ -23,9 +23,9 @@ from uavexp.build import (
     protocol_members,
     protocol_of,
 )
-from uavexp.cli.composition import Composer
-from uavexp.cli.options import PRESET_GROUP, RUNNER_GROUP, read_option
-from uavexp.cli.overrides import Setting, parse_settings
+from uavexp.config.composition import Composer
+from uavexp.config.options import PRESET_GROUP, RUNNER_GROUP, read_option
+from uavexp.config.overrides import Setting, parse_settings
 from uavexp.parameters import MISSING, check_value, parameter_types, plain, required_parameters
 from uavexp.paths import PACKAGE, conf_folder
 from uavexp.trial import Parts

@@ -12,11 +12,12 @@ from omegaconf import OmegaConf
 
 from tests.components import CONF, numbers, options
 from tests.fields import bounds, box, empty, field_from, warehouse
+from uavexp.arrays import Bool, Float
 from uavexp.errors import ConfigError
-from uavexp.geometry import evaluate
-from uavexp.mapping.base import DistanceField
+from uavexp.field import DistanceField
 from uavexp.planner.base import Planner
-from uavexp.types import Bool, Float, Goal, Limits, PlanRequest, PlanResult, PlanStatus, Trajectory
+from uavexp.trajectory import Trajectory, evaluate
+from uavexp.types import Goal, Limits, PlanRequest, PlanResult, PlanStatus
 
 LIMITS = Limits(
     max_speed_mps=2.5, max_acceleration_mps2=2.5, max_body_rate_radps=2.0, body_size_m=(0.32, 0.32, 0.12)

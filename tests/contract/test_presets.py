@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 import yaml
 
-from uavexp.cli.composition import Composer
-from uavexp.cli.overrides import parse_settings
+from uavexp.config.composition import Composer
+from uavexp.config.overrides import parse_settings
 from uavexp.paths import conf_folder
 
 PRESETS = sorted(path.stem for path in (conf_folder() / "strategy").glob("*.yaml"))

@@ -14,11 +14,12 @@ import uavexp
 from tests.components import build, check_yaml, numbers, options
 from tests.fields import empty
 from tests.triggers import LIMITS, STRAIGHT, change, goal_at, observe, room
+from uavexp.braking import with_stop
 from uavexp.errors import ConfigError
-from uavexp.mapping.base import DistanceField
+from uavexp.field import DistanceField
 from uavexp.metrics.replanning import CAUSES, blocked_delays
-from uavexp.planner.brake import with_stop
-from uavexp.types import Decision, Observation, Outcome, PlanStatus, Trajectory
+from uavexp.trajectory import Trajectory
+from uavexp.types import Decision, Observation, Outcome, PlanStatus
 
 pytestmark = pytest.mark.parametrize("option", options("trigger"))
 

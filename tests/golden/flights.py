@@ -54,7 +54,7 @@ FLIGHTS: dict[str, dict[str, Any]] = {
 def fly() -> dict[str, dict[str, Any]]:
     """Fly every one of `FLIGHTS`; the digest of each log, and what tells a person what moved."""
     import uavexp
-    from uavexp.logs import arrays_digest, log_arrays
+    from uavexp.store.logs import arrays_digest, log_arrays
 
     found = {}
     for name, values in FLIGHTS.items():

@@ -17,11 +17,11 @@ import pytest
 import uavexp
 from uavexp.__main__ import main
 from uavexp.errors import ConfigError
-from uavexp.logs import read_log
 from uavexp.metrics import evaluate
 from uavexp.paths import PACKAGE, conf_folder
-from uavexp.records import read_record
-from uavexp.table import FIRST
+from uavexp.store.logs import read_log
+from uavexp.store.records import read_record
+from uavexp.store.table import FIRST
 
 TINY = ("world=random_columns", "world.size_m=[8,6,3]")
 
@@ -42,7 +42,7 @@ def run(*typed: str, cwd: Path, **environment: str) -> subprocess.CompletedProce
 def somewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Every command runs in an empty folder."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("uavexp.cli.folders.outputs_root", lambda: tmp_path / "outputs")
+    monkeypatch.setattr("uavexp.store.folders.outputs_root", lambda: tmp_path / "outputs")
     return tmp_path
 
 

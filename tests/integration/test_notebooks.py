@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from tests.folders import ROOT
 from tests.studies import copy_of, flown  # noqa: F401
 
-FOLDER = Path(__file__).parents[2] / "analysis"
+FOLDER = ROOT / "analysis"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 KINDS = {"mcr_thresholds": "tradeoff", "mcr_policies": "policies", "mcr_noise_latency_drift": "robustness"}
 

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import uavexp
+from tests.folders import SHARED as DATA
 from uavexp.types import Outcome
-
-DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 
 pytestmark = pytest.mark.skipif(
     not (DATA / "MANIFEST.json").exists(), reason="../shared/data with the real buildings is absent"

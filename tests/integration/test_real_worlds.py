@@ -1,12 +1,12 @@
 """Buildings and maps that nobody here made, against the path lengths of their manifest."""
 
 import json
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from tests.folders import SHARED as DATA
 from uavexp.errors import WorldError
 from uavexp.geometry import polyline_length_m
 from uavexp.scene import Scene
@@ -14,7 +14,6 @@ from uavexp.types import World
 from uavexp.world import lattice
 from uavexp.world.file import File
 
-DATA = Path(__file__).parents[2].parent / "shared" / "data"
 MANIFEST = DATA / "MANIFEST.json"
 pytestmark = pytest.mark.skipif(not MANIFEST.is_file(), reason=f"no third-party worlds in {DATA}")
 

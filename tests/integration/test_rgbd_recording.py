@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import matplotlib.image
 import numpy as np
@@ -11,10 +10,12 @@ import pytest
 from scipy.ndimage import distance_transform_edt
 
 from tests.contract.test_mapping_contract import NOTHING, OPTIONS, build
-from uavexp.mapping.base import FREE, OCCUPIED, UNKNOWN, MapBackend
-from uavexp.types import DepthScan, Float
+from tests.folders import SHARED as DATA
+from uavexp.arrays import Float
+from uavexp.field import FREE, OCCUPIED, UNKNOWN
+from uavexp.mapping.base import MapBackend
+from uavexp.types import DepthScan
 
-DATA = Path(__file__).parents[2].parent / "shared" / "data"
 FOLDER = DATA / "rgbd" / "sevenscenes_a"
 STEP = 4  # every 4th pixel of 640 x 480
 RANGE_M = 4.0

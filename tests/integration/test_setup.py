@@ -18,10 +18,10 @@ import yaml
 from packaging.requirements import Requirement
 
 from tests.fields import field_from
-from uavexp.geometry import evaluate
+from tests.folders import ROOT
+from uavexp.trajectory import evaluate
 from uavexp.types import Goal, Limits, PlanRequest, PlanStatus
 
-ROOT = Path(__file__).parents[2]
 LOCK = (ROOT / "requirements.lock").read_text()
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 DIRECT = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["test"], "hatchling"]

@@ -17,10 +17,10 @@ import pytest
 
 from tests.sweeps import QUICK, assert_same_study, begin, records, run
 from uavexp.__main__ import main
-from uavexp.cli.history import commit
 from uavexp.paths import PACKAGE
-from uavexp.records import canonical_json, digest, read_record, seal
-from uavexp.study import collect, read_runs, read_study
+from uavexp.store.history import commit
+from uavexp.store.records import canonical_json, digest, read_record, seal
+from uavexp.store.study import collect, read_runs, read_study
 
 STUDY = (*QUICK, "strategy=mcr,tbr", "seed=0:3")
 FAULTY = ("--config-dir", str(PACKAGE.parent / "tests" / "faulty"))

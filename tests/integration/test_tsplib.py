@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any
 
 import pytest
 
+from tests.folders import SHARED as DATA
 from uavexp.inspection.tour import closed_tour, tour_length
 from uavexp.inspection.tsplib import read
-
-DATA = Path(__file__).parents[2].parent / "shared" / "data"
 
 
 def instances() -> list[dict[str, Any]]:

@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.voxel_paths import is_path, random_grid, shortest
+from uavexp.planner.find.voxel.grid import VoxelGrid
 from uavexp.planner.improved_astar import Form, HorizontalCount, ImprovedAstar, VerticalRule
-from uavexp.planner.voxel.grid import VoxelGrid
 
 SHAPES = st.tuples(st.integers(1, 7), st.integers(1, 7), st.integers(1, 7))
 

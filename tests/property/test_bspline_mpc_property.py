@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.fields import bounds, box, empty, field_from
-from uavexp.geometry import evaluate
 from uavexp.planner.bspline_mpc import BsplineMpc
 from uavexp.planner.mpc.regions import facing
+from uavexp.trajectory import evaluate
 from uavexp.types import Goal, Limits, PlanRequest, PlanStatus, Tracks
 
 LIMITS = Limits(

@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.fields import bounds, box, empty, field_from
-from uavexp.geometry import evaluate
 from uavexp.planner.bspline_qp import BsplineQp
-from uavexp.planner.smoothing.bspline_qp import Derivative
+from uavexp.planner.shape.corridor_qp import Derivative
+from uavexp.trajectory import evaluate
 from uavexp.types import Goal, Limits, PlanRequest, PlanStatus
 
 LIMITS = Limits(

@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.fields import bounds, box, empty, field_from
-from uavexp.geometry import evaluate
 from uavexp.planner.df_bitstar import DfBitstar, Edges
-from uavexp.planner.motion import cubic_time, least_time
+from uavexp.planner.find.tree.motion import cubic_time, least_time
+from uavexp.trajectory import evaluate
 from uavexp.types import Goal, Limits, PlanRequest, PlanStatus
 
 LIMITS = Limits(

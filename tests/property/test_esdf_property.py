@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.exact_distance import Replay, exact_field
-from uavexp.mapping.base import FREE, OCCUPIED
+from uavexp.field import FREE, OCCUPIED
 
 shapes = st.tuples(*(st.integers(1, 11) for _ in range(3)))
 

@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.fields import bounds, box, empty, field_from
-from uavexp.geometry import evaluate
 from uavexp.planner.min_acc import MinAcc
+from uavexp.trajectory import evaluate
 from uavexp.types import Goal, Limits, PlanRequest, PlanStatus
 
 LIMITS = Limits(

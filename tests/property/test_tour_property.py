@@ -8,8 +8,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from uavexp.arrays import Float
 from uavexp.inspection.tour import closed_tour, open_tour, tour_length
-from uavexp.types import Float
 
 sizes = st.integers(1, 40)
 seeds = st.integers(0, 2**32 - 1)

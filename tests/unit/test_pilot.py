@@ -9,19 +9,19 @@ import pytest
 
 from tests.fields import box, empty, field_from
 from tests.unit.test_trigger import LIMITS, change, observe
+from uavexp.braking import stopping_distance_m, with_stop
 from uavexp.explorer.target_only import TargetOnly
-from uavexp.geometry import evaluate
-from uavexp.mapping.base import DistanceField
+from uavexp.field import DistanceField
 from uavexp.pilot import Pilot
-from uavexp.planner.brake import hover_before, stopping_distance_m, with_stop
 from uavexp.planner.min_acc import MinAcc
 from uavexp.recorder import Stopwatch
 from uavexp.safety.brake import Brake
 from uavexp.safety.none import NoBrake
+from uavexp.trajectory import Trajectory, evaluate, hover_before
 from uavexp.trigger.mcr import Mcr
 from uavexp.trigger.ssp import Ssp
 from uavexp.trigger.tbr import Tbr
-from uavexp.types import Observation, PlanStatus, Reference, State, Trajectory
+from uavexp.types import Observation, PlanStatus, Reference, State
 
 START, TARGET = np.array([1.0, 2.0, 1.0]), np.array([9.0, 2.0, 1.0])
 BOUNDS = np.array([[0.0, 0.0, 0.0], [10.0, 4.0, 2.0]])

@@ -15,7 +15,8 @@ import math
 import numba as nb
 import numpy as np
 
-from uavexp.types import Bodies, Float, Int, Shape, UInt8
+from uavexp.arrays import Float, Int, UInt8
+from uavexp.types import Bodies, Shape
 
 _ROUNDS = 8  # of projections between a body and a box
 _SPHERE, _CYLINDER = int(Shape.SPHERE), int(Shape.CYLINDER)

@@ -7,7 +7,8 @@ import math
 import numba as nb
 import numpy as np
 
-from uavexp.types import Bodies, Bool, Float, Float32, Shape, UInt8
+from uavexp.arrays import Bool, Float, Float32, UInt8
+from uavexp.types import Bodies, Shape
 
 ABSENT_M = np.array([0.0, 0.0, -1000.0])  # where a body is while it is not there
 LOWEST_M = -500.0  # a body below is not there

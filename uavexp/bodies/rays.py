@@ -7,8 +7,9 @@ import math
 import numba as nb
 import numpy as np
 
+from uavexp.arrays import Float, Float32, UInt8
 from uavexp.bodies.points import LOWEST_M
-from uavexp.types import Bodies, Float, Float32, Shape, UInt8
+from uavexp.types import Bodies, Shape
 
 _SPHERE, _CYLINDER = int(Shape.SPHERE), int(Shape.CYLINDER)
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import ast
 from pathlib import Path
 
-from uavexp.cli.experiment import list_experiments, title_of
-from uavexp.cli.options import PRESET_GROUP, Option, list_options, read_option
+from uavexp.config.experiment import list_experiments, title_of
+from uavexp.config.options import PRESET_GROUP, Option, list_options, read_option
 from uavexp.paths import PACKAGE, conf_folder
 
 USAGE = """\

@@ -7,10 +7,10 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from uavexp.cli.composition import Command, Composer
+from uavexp.config.composition import Command, Composer
+from uavexp.config.trust import trusted_packages
 from uavexp.paths import PACKAGE, conf_folder, outputs_root
-from uavexp.records import code_digest, lock_digest
-from uavexp.trust import trusted_packages
+from uavexp.store.records import code_digest, lock_digest
 
 
 def config_text(composer: Composer, command: Command, part: str) -> str:

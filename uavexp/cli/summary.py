@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from rich.table import Table
 
-from uavexp.table import Row
+from uavexp.store.table import Row
 
 _CAUSES = "replans_"
 

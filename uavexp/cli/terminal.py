@@ -20,14 +20,14 @@ from rich.progress import (
 )
 
 from uavexp.cli.summary import cell_table, trial_table
-from uavexp.records import PICTURE
-from uavexp.study import TRIALS
-from uavexp.table import pooled_versions
+from uavexp.store.records import PICTURE
+from uavexp.store.study import TRIALS
+from uavexp.store.table import pooled_versions
 
 if TYPE_CHECKING:
-    from uavexp.cli.plan import Plan
+    from uavexp.store.table import Row
     from uavexp.sweep.job import Done, Job
-    from uavexp.table import Row
+    from uavexp.sweep.plan import Plan
 
 _PATIENCE_S = 2.0  # nothing is shown for work that is done sooner
 _PLAIN_PERIOD_S = 10.0  # between lines when the output is no terminal

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from uavexp.arrays import Bool, Float
 from uavexp.o3d import open3d
-from uavexp.types import Bool, Float
 
 _SLAB_POINTS = 400_000  # points whose neighbours are sought at once
 _HALO_M = 1.0  # neighbours are sought so far beyond a slab; further ones count as further than they are

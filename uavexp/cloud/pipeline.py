@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from uavexp.arrays import Bool, Float
 from uavexp.cloud.outliers import outliers
 from uavexp.cloud.planes import Plane, fit_planes, plane_of
 from uavexp.cloud.points import CloudError, checked
 from uavexp.cloud.traversability import obstacles
 from uavexp.cloud.voxels import Voxels, voxelise
 from uavexp.errors import require, require_positive
-from uavexp.types import Bool, Float
 
 _LEAST_POINTS = 3  # a plane's
 

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from uavexp.arrays import Float, Int32
 from uavexp.o3d import open3d
-from uavexp.types import Float, Int32
 
 _CHUNK = 500_000  # points judged at once
 _UPRIGHT = np.sin(np.deg2rad(15.0))  # |n_z| of a wall is below this, of a floor above the cosine

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from uavexp.arrays import Float
 from uavexp.errors import UavexpError
-from uavexp.types import Float
 
 _OPEN3D = (".ply", ".pcd", ".xyz", ".pts")
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from uavexp.arrays import Float
 from uavexp.scene import Scene
-from uavexp.types import Float
 
 _GOLDEN = np.pi * (3.0 - np.sqrt(5.0))
 

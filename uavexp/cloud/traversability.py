@@ -6,8 +6,8 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from uavexp.arrays import Bool
 from uavexp.cloud.voxels import Voxels, packed
-from uavexp.types import Bool
 
 _HALF_AROUND = np.array(
     [(i, j, k) for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1) if (i, j, k) > (0, 0, 0)]

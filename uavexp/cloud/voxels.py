@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from uavexp.arrays import Float, Int
 from uavexp.cloud.points import CloudError
-from uavexp.types import Float, Int
 
 _CHUNK = 1_000_000  # points sorted into voxels at once
 _BITS = 20  # of a voxel's index along an axis: a million voxels

@@ -17,10 +17,11 @@ from dataclasses import dataclass, field
 
 import numba as nb
 
+from uavexp.arrays import Float
 from uavexp.controller.position_velocity import PositionVelocity
 from uavexp.flatness import attitude_and_rate
 from uavexp.geometry import GRAVITY_MPS2, rotation_from_quaternion
-from uavexp.types import Command, Float, Limits, Reference, State
+from uavexp.types import Command, Limits, Reference, State
 
 
 @nb.njit(cache=True)

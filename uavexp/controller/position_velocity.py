@@ -16,9 +16,10 @@ from dataclasses import dataclass, field
 import numba as nb
 import numpy as np
 
+from uavexp.arrays import Float
 from uavexp.errors import require, require_non_negative, require_positive
 from uavexp.geometry import GRAVITY_MPS2, quaternion_from_rotation
-from uavexp.types import Command, Float, Limits, Reference, State
+from uavexp.types import Command, Limits, Reference, State
 
 _LEAST_LIFT = 0.3  # share of gravity that is always lifted, so that body z stays up
 

@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from uavexp.mapping.base import DistanceField
+from uavexp.field import DistanceField
 from uavexp.types import Bodies, Limits, Scan, Tracks
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numba as nb
 import numpy as np
 
-from uavexp.types import Bool, Float, Int
+from uavexp.arrays import Bool, Float, Int
 
 _CELL_M = 0.1  # points of one cell belong together
 _SPAN = 1 << 20  # cells along an axis that a key can tell apart: 100 km

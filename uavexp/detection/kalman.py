@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from uavexp.types import Float
+from uavexp.arrays import Float
 
 
 class Estimate(StrEnum):

@@ -10,12 +10,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from uavexp.arrays import Int
 from uavexp.bodies import present
 from uavexp.detection.kalman import Estimate, Motion, MotionFilter
 from uavexp.detection.returns import without_bodies
 from uavexp.errors import require, require_non_negative, require_option, require_positive
-from uavexp.mapping.base import DistanceField
-from uavexp.types import Bodies, Int, Limits, Scan, Tracks
+from uavexp.field import DistanceField
+from uavexp.types import Bodies, Limits, Scan, Tracks
 
 
 @dataclass(slots=True, kw_only=True)

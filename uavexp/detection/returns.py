@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numba as nb
 import numpy as np
 
+from uavexp.arrays import Bool, Float, Float32, Int, UInt8
 from uavexp.bodies import distance_m
-from uavexp.types import Bodies, Bool, DepthScan, Float, Float32, Int, Scan, UInt8
+from uavexp.types import Bodies, DepthScan, Scan
 
 
 class Returns(NamedTuple):

@@ -23,13 +23,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from uavexp.arrays import Bool, Float
 from uavexp.detection.clusters import cluster, split
 from uavexp.detection.kalman import Estimate, Motion
 from uavexp.detection.returns import free_at, returns, viewpoint_m, without
 from uavexp.detection.tracker import Tracker, TrackRule
 from uavexp.errors import require, require_non_negative, require_option, require_positive
-from uavexp.mapping.base import DistanceField
-from uavexp.types import Bodies, Bool, Float, Limits, Scan, Tracks
+from uavexp.field import DistanceField
+from uavexp.types import Bodies, Limits, Scan, Tracks
 
 
 @dataclass(slots=True, kw_only=True)

@@ -22,12 +22,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from uavexp.arrays import Bool, Float, Int
 from uavexp.detection.clusters import Clusters
 from uavexp.detection.kalman import Estimate, Motion, MotionFilter
 from uavexp.detection.returns import viewpoint_m
 from uavexp.detection.sight import seen_empty
-from uavexp.mapping.base import DistanceField
-from uavexp.types import Bool, Float, Int, Scan, Tracks
+from uavexp.field import DistanceField
+from uavexp.types import Scan, Tracks
 
 _NEW_MISSES = 2  # a new track that misses more in a row is forgotten
 _EMPTY = 2  # a confirmed one that is seen to be gone more often in a row, too

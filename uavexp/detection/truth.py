@@ -9,7 +9,7 @@ import numpy as np
 from uavexp.bodies import present
 from uavexp.detection.returns import without_bodies
 from uavexp.errors import require_non_negative
-from uavexp.mapping.base import DistanceField
+from uavexp.field import DistanceField
 from uavexp.types import Bodies, Limits, Scan, Tracks
 
 

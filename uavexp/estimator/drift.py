@@ -18,9 +18,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from uavexp.arrays import Float
 from uavexp.errors import require, require_non_negative, require_positive
 from uavexp.geometry import multiply_quaternions, quaternion_from_yaw, rotation_from_quaternion
-from uavexp.types import Float, State
+from uavexp.types import State
 
 
 @dataclass(slots=True, kw_only=True)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from uavexp.types import Float, Goal, Limits, Observation
+from uavexp.arrays import Float
+from uavexp.types import Goal, Limits, Observation
 
 
 class Explorer(Protocol):

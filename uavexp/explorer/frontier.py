@@ -29,6 +29,7 @@ from enum import StrEnum
 
 import numpy as np
 
+from uavexp.arrays import Bool, Float, Int32
 from uavexp.errors import require, require_non_negative, require_option, require_positive
 from uavexp.explorer.planar import (
     ascend,
@@ -40,7 +41,7 @@ from uavexp.explorer.planar import (
 )
 from uavexp.explorer.view import Search, View, view_of
 from uavexp.mapping.projection import project
-from uavexp.types import Bool, Float, Goal, Int32, Limits, Observation
+from uavexp.types import Goal, Limits, Observation
 
 
 class Unknown(StrEnum):

@@ -8,9 +8,9 @@ import numba as nb
 import numpy as np
 from scipy import ndimage
 
-from uavexp.mapping.field import value_and_gradient
+from uavexp.arrays import Bool, Float, Float32, Int, Int32, UInt8
+from uavexp.field import value_and_gradient
 from uavexp.o3d import open3d
-from uavexp.types import Bool, Float, Float32, Int, Int32, UInt8
 
 UNKNOWN, FREE = 0, 1  # values of `PlanarMap.state` used here
 

@@ -6,8 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from uavexp.arrays import Float
 from uavexp.errors import require_non_negative, require_positive
-from uavexp.types import Float, Goal, Limits, Observation
+from uavexp.types import Goal, Limits, Observation
 
 
 @dataclass(slots=True, kw_only=True)

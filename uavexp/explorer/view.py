@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from uavexp.arrays import Bool, Float, Float32, Int
 from uavexp.explorer.planar import FREE, UNKNOWN, path_lengths
 from uavexp.mapping.projection import PlanarMap
-from uavexp.types import Bool, Float, Float32, Int
 
 
 @dataclass(frozen=True, slots=True)

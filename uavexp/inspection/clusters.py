@@ -13,8 +13,8 @@ import math
 
 import numpy as np
 
+from uavexp.arrays import Float, Int
 from uavexp.inspection.tour import open_tour, tour_length
-from uavexp.types import Float, Int
 
 Clusters = tuple[tuple[int, ...], ...]  # viewpoints of each cluster, in the order of visit
 

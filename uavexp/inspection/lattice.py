@@ -12,9 +12,9 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from uavexp.arrays import Bool, Float, Int, Int32
 from uavexp.errors import require_positive
-from uavexp.mapping.base import DistanceField
-from uavexp.types import Bool, Float, Int, Int32
+from uavexp.field import DistanceField
 
 EDGE_UNITS = 500  # of the longest edge: lengths are whole numbers, so buckets serve as queue
 _STEPS = np.array(

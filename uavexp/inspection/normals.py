@@ -5,8 +5,8 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
+from uavexp.arrays import Bool, Float, Int32
 from uavexp.o3d import open3d
-from uavexp.types import Bool, Float, Int32
 
 MAX_NEIGHBOURS = 60  # of a point when its normal is fitted
 

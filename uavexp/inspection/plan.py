@@ -7,7 +7,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from uavexp.arrays import Bool, Float, Int
 from uavexp.errors import require
+from uavexp.field import DistanceField
 from uavexp.inspection import clusters as runs
 from uavexp.inspection.lattice import Lattice, lattice_of
 from uavexp.inspection.reference import Surface
@@ -16,8 +18,6 @@ from uavexp.inspection.tour import open_tour
 from uavexp.inspection.travel import is_reachable, travel_lengths, travel_matrix
 from uavexp.inspection.viewpoints import Pattern, Viewpoints, added, needed, pattern_of
 from uavexp.inspection.visibility import Camera, Grid, Views, seen_by, views_of, witnesses
-from uavexp.mapping.base import DistanceField
-from uavexp.types import Bool, Float, Int
 
 EYE_SPACING = 2  # of the places tried for coverable cells, in cells of the lattice
 

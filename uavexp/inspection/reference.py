@@ -14,13 +14,13 @@ import numba as nb
 import numpy as np
 from scipy import ndimage
 
+from uavexp.arrays import Bool, Float, Float32, Int, Int32, UInt8
 from uavexp.errors import require_positive
+from uavexp.field import FREE, DistanceField
 from uavexp.inspection.normals import fit_normals, free_sides, towards_free
 from uavexp.inspection.visibility import OCCUPIED
-from uavexp.mapping.base import FREE, DistanceField
 from uavexp.mapping.esdf import SignedDistance
 from uavexp.triangle_grid import box_meets_triangle
-from uavexp.types import Bool, Float, Float32, Int, Int32, UInt8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

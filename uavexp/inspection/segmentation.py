@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numba as nb
 import numpy as np
 
+from uavexp.arrays import Float, Int, Int32
 from uavexp.errors import require, require_positive
 from uavexp.inspection.normals import neighbours
 from uavexp.inspection.reference import Surface
-from uavexp.types import Float, Int, Int32
 
 MAX_NEIGHBOURS = 32
 

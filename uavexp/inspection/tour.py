@@ -18,9 +18,9 @@ from pathlib import Path
 
 import numpy as np
 
+from uavexp.arrays import Float, Int, Int32
 from uavexp.errors import UavexpError, require
 from uavexp.inspection import tour_array, tour_kernels, tsplib
-from uavexp.types import Float, Int, Int32
 
 NEIGHBOURS = 8  # length of the neighbour lists
 KICKS_PER_NODE = 10

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
-from uavexp.types import Float, Int32
+from uavexp.arrays import Float, Int32
 
 
 @nb.njit(cache=True)

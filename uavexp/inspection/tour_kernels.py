@@ -20,8 +20,8 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
+from uavexp.arrays import Float, Int32, UInt8
 from uavexp.inspection.tour_array import beside, reverse, undo
-from uavexp.types import Float, Int32, UInt8
 
 BREADTH = 5  # alternatives tried at the first step of a chain; 1 after it
 DEPTH = 8  # steps of a chain

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
+from uavexp.arrays import Bool, Float, Float32, Int, Int32
 from uavexp.inspection.lattice import EDGE_UNITS, Lattice
-from uavexp.types import Bool, Float, Float32, Int, Int32
 
 _FINE_UNITS = 8000  # the same between points, where edges are long
 _NEAREST = 100  # points that the wave from a point must reach; those beyond go through them

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from uavexp.arrays import Float
 from uavexp.errors import UavexpError
-from uavexp.types import Float
 
 MAX_NODES = 6000  # the matrix of distances is held whole: 288 MB
 _EARTH_KM = 6378.388  # radius, and pi to the digits below: what the published optima were computed with

@@ -13,12 +13,12 @@ from typing import NamedTuple
 import numba as nb
 import numpy as np
 
+from uavexp.arrays import Bool, Float, Int
 from uavexp.errors import require, require_non_negative
+from uavexp.field import DistanceField
 from uavexp.inspection.reference import Surface
 from uavexp.inspection.viewpoints import Viewpoints
 from uavexp.inspection.visibility import Camera, Grid, Optics, Views, framed_turns, half_turn, sighted_cells
-from uavexp.mapping.base import DistanceField
-from uavexp.types import Bool, Float, Int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

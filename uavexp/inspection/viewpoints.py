@@ -16,11 +16,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from uavexp.arrays import Bool, Float, Int
 from uavexp.errors import require, require_positive
 from uavexp.inspection.reference import Surface
 from uavexp.inspection.segmentation import Segment
 from uavexp.inspection.visibility import Camera, Grid, Views, seen_by, views_of
-from uavexp.types import Bool, Float, Int
 
 Fits = Callable[[Float], Bool]  # whether the vehicle can be at points (N, 3) -> (N,)
 

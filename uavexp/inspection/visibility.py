@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numba as nb
 import numpy as np
 
+from uavexp.arrays import Bool, Float, Int, Int32, UInt8
 from uavexp.errors import require, require_non_negative, require_positive
-from uavexp.types import Bool, Float, Int, Int32, UInt8
 
 OCCUPIED = 2  # value of `DistanceField.state`
 

@@ -7,8 +7,8 @@ from typing import Any
 import numba as nb
 import numpy as np
 
+from uavexp.arrays import Float32, Int32, UInt8
 from uavexp.o3d import open3d
-from uavexp.types import Float32, Int32, UInt8
 
 EDGE = 8  # voxels along a block
 _BLOCK = EDGE**3

@@ -15,13 +15,14 @@ from dataclasses import dataclass
 import numba as nb
 import numpy as np
 
-from uavexp.mapping.base import DistanceField
+from uavexp.arrays import Float, Float32, Int32, UInt8
+from uavexp.field import DistanceField
 from uavexp.mapping.frustum import column_depths, frustum_box
 from uavexp.mapping.occupancy import OccupancyMap, Rule, enlist, judge, keeps_free
 from uavexp.mapping.parameters import MapParameters
 from uavexp.mapping.rays import integrate_rays
 from uavexp.scene import Scene
-from uavexp.types import Float, Float32, Int32, MapUpdate, RayScan, Scan, UInt8
+from uavexp.types import MapUpdate, RayScan, Scan
 
 _NEAR_M = 1e-3  # nothing is nearer to the camera than this
 

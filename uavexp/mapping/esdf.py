@@ -28,6 +28,7 @@ from typing import Any
 
 import numpy as np
 
+from uavexp.arrays import Bool, Float32, Int32, UInt8
 from uavexp.errors import require
 from uavexp.mapping.esdf_kernels import (
     Int16,
@@ -39,7 +40,7 @@ from uavexp.mapping.esdf_kernels import (
     list_changed,
     mark_seen,
 )
-from uavexp.types import Bool, Float32, Int32, MapUpdate, UInt8
+from uavexp.types import MapUpdate
 
 _LARGEST_CAP = 16_000  # sums of two capped squares must fit 16 bits
 

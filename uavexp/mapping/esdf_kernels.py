@@ -13,7 +13,7 @@ import numba as nb
 import numpy as np
 import numpy.typing as npt
 
-from uavexp.types import Float32, Int32, UInt8
+from uavexp.arrays import Float32, Int32, UInt8
 
 Int16 = npt.NDArray[np.int16]
 _OCCUPIED = 2  # `uavexp.mapping.base.OCCUPIED`; a literal so that the kernels compile it in

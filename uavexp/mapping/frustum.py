@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
-from uavexp.types import Float, Float32
+from uavexp.arrays import Float, Float32
 
 
 @nb.njit(cache=True)

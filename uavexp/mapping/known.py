@@ -19,12 +19,13 @@ from dataclasses import dataclass
 import numba as nb
 import numpy as np
 
+from uavexp.arrays import Bool, Float, Float32, Int, UInt8
 from uavexp.errors import require, require_positive
-from uavexp.mapping.base import FREE, OCCUPIED, DistanceField
+from uavexp.field import FREE, OCCUPIED, DistanceField
 from uavexp.mapping.esdf import SignedDistance, distance_table
 from uavexp.mapping.occupancy import grid_shape
 from uavexp.scene import Scene
-from uavexp.types import Bool, Float, Float32, Int, MapUpdate, Scan, UInt8
+from uavexp.types import MapUpdate, Scan
 
 _BYTES_PER_VOXEL = 80  # ESDF 19, centres, rays and distances while it is made
 _BLOCKS = (8, 4, 2)  # edges of the blocks of voxels asked first, each half the one before

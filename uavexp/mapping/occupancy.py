@@ -34,10 +34,11 @@ from typing import NamedTuple
 import numba as nb
 import numpy as np
 
+from uavexp.arrays import Float, Float32, Int32, UInt8
 from uavexp.errors import WorldError, require
-from uavexp.mapping.base import DistanceField
+from uavexp.field import DistanceField
 from uavexp.mapping.esdf import SignedDistance
-from uavexp.types import Float, Float32, Int32, MapUpdate, UInt8
+from uavexp.types import MapUpdate
 
 _UNKNOWN, _FREE, _OCCUPIED = 0, 1, 2  # of `mapping.base`; literals so that kernels compile them in
 # bits of a live voxel's byte: 0-1 state, 2 on the list of changes, 3-7 evidence

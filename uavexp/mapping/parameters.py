@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from uavexp.arrays import Float
 from uavexp.errors import require, require_positive
 from uavexp.mapping.esdf import distance_table
 from uavexp.mapping.occupancy import OccupancyMap, Rule, check_rule
-from uavexp.types import Float
 
 
 @dataclass(slots=True, kw_only=True)

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numba as nb
 import numpy as np
 
+from uavexp.arrays import Float, Float32, UInt8
 from uavexp.errors import require, require_positive
-from uavexp.mapping.base import FREE, OCCUPIED, UNKNOWN, DistanceField
-from uavexp.types import Float, Float32, UInt8
+from uavexp.field import FREE, OCCUPIED, UNKNOWN, DistanceField
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -19,8 +19,9 @@ import math
 import numba as nb
 import numpy as np
 
+from uavexp.arrays import Float, Float32, Int32, UInt8
 from uavexp.mapping.occupancy import OccupancyMap, Rule, enlist, judge, keeps_free
-from uavexp.types import Float, Float32, Int32, RayScan, UInt8
+from uavexp.types import RayScan
 
 _INSIDE = 1e-6  # voxels before the grid's border: rounding must not lead out of it
 _LEVEL = 1e-12  # a ray that rises less along an axis never crosses a border of it

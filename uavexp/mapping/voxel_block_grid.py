@@ -28,8 +28,9 @@ from typing import Any
 import numba as nb
 import numpy as np
 
+from uavexp.arrays import Bool, Float, Float32, Int32, UInt8
 from uavexp.errors import ConfigError, require
-from uavexp.mapping.base import DistanceField
+from uavexp.field import DistanceField
 from uavexp.mapping.blocks import EDGE, Blocks, blocks_of, write_voxels
 from uavexp.mapping.frustum import column_depths, frustum_box
 from uavexp.mapping.occupancy import OccupancyMap, Rule, enlist, judge, keeps_free
@@ -37,7 +38,7 @@ from uavexp.mapping.parameters import MapParameters
 from uavexp.mapping.rays import integrate_rays
 from uavexp.o3d import open3d
 from uavexp.scene import Scene
-from uavexp.types import Bool, DepthScan, Float, Float32, Int32, MapUpdate, RayScan, Scan, UInt8
+from uavexp.types import DepthScan, MapUpdate, RayScan, Scan
 
 _LARGEST_START = 20_000  # blocks that are allocated at once; more are added when needed
 _DEVICE = re.compile(r"CPU:0|CUDA:\d+")

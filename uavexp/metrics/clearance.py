@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from uavexp.types import Float, TrialLog
+from uavexp.arrays import Float
+from uavexp.types import TrialLog
 
 
 def smallest_m(clearance_m: Float) -> float:

@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
+from uavexp.arrays import Bool, Float
 from uavexp.geometry import polyline_length_m
-from uavexp.types import Bool, Float, Outcome, TrialLog, World
+from uavexp.types import Outcome, TrialLog, World
 
 
 def coverage(log: TrialLog) -> float:

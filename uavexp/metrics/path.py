@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from uavexp.arrays import Float
 from uavexp.geometry import polyline_length_m
-from uavexp.types import Float, TrialLog
+from uavexp.types import TrialLog
 
 
 def path_length_m(log: TrialLog) -> float:

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from uavexp.geometry import evaluate, polyline_length_m
+from uavexp.arrays import Bool, Float
+from uavexp.geometry import polyline_length_m
 from uavexp.metrics import voxel_path
 from uavexp.scene import Scene
-from uavexp.types import Bool, Float, Trajectory, TrialLog, World
+from uavexp.trajectory import Trajectory, evaluate
+from uavexp.types import TrialLog, World
 
 GRID_S = 1e-3
 CHECKPOINTS = tuple(n * 10**k for k in range(5) for n in (10, 15, 20, 30, 50, 70))  # iterations

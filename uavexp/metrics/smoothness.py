@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from uavexp.types import Float
+from uavexp.arrays import Float
 
 WINDOW_S = 0.25  # short against a manoeuvre (about 1 s), long against a control step (0.01 s)
 DEGREE = 3

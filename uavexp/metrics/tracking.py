@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from uavexp.types import Float
+from uavexp.arrays import Float
 
 
 def distances_m(position_m: Float, other_m: Float) -> Float:

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from uavexp.arrays import Float, Int
 from uavexp.bodies import present
-from uavexp.types import Contact, Float, Int, TrialLog
+from uavexp.types import Contact, TrialLog
 
 HORIZONS_S = (0.3, 0.6, 0.9, 1.2)
 MEAN_HORIZONS_S = tuple(0.1 * step for step in range(1, 13))  # the mean is taken over these

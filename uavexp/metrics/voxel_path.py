@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from uavexp.types import Float
+from uavexp.arrays import Float
 
 _LEVEL = 1e-6  # share of the path's extent below which a height difference is rounding
 

@@ -6,9 +6,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from uavexp.arrays import Float
 from uavexp.explorer.base import Explorer
 from uavexp.scene import Scene
-from uavexp.types import Float, Limits, Observation, Outcome, State, World
+from uavexp.types import Limits, Observation, Outcome, State, World
 
 
 class Mission(Protocol):

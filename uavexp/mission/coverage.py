@@ -6,13 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from uavexp.arrays import Bool, Float, Int
+from uavexp.field import DistanceField
 from uavexp.inspection.lattice import lattice_of
 from uavexp.inspection.plan import sparse_places
 from uavexp.inspection.reference import Surface
 from uavexp.inspection.visibility import Camera, Grid, visible_cells, witnesses
-from uavexp.mapping.base import DistanceField
 from uavexp.scene import Scene
-from uavexp.types import Bool, Float, Int, World
+from uavexp.types import World
 
 _NOTHING = Grid(np.zeros((1, 1, 1), dtype=np.uint8), np.zeros(3), 1e3)  # blocks no sight
 

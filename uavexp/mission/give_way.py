@@ -11,10 +11,11 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
-from uavexp.geometry import evaluate
-from uavexp.mapping.base import DistanceField
-from uavexp.planner.moving import box_gap, turns_s
-from uavexp.types import Bool, Float, Limits, Tracks, Trajectory
+from uavexp.arrays import Bool, Float
+from uavexp.field import DistanceField
+from uavexp.planner.movers.moving import box_gap, turns_s
+from uavexp.trajectory import Trajectory, evaluate
+from uavexp.types import Limits, Tracks
 
 HORIZON_S = 1.8  # predictions count for so long
 STEP_S = 0.1

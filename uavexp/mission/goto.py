@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from uavexp.arrays import Float
 from uavexp.errors import require_non_negative, require_positive
 from uavexp.explorer.base import Explorer
 from uavexp.scene import Scene
-from uavexp.types import Float, Limits, Observation, Outcome, State, World
+from uavexp.types import Limits, Observation, Outcome, State, World
 
 
 @dataclass(slots=True, kw_only=True)

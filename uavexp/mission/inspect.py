@@ -10,13 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from uavexp.errors import (
-    WorldError,
-    require,
-    require_non_negative,
-    require_option,
-    require_positive,
-)
+from uavexp.arrays import Float
+from uavexp.errors import WorldError, require, require_non_negative, require_option, require_positive
 from uavexp.explorer.base import Explorer
 from uavexp.geometry import yaw_of
 from uavexp.inspection.plan import InspectionPlan, Settings, plan_inspection, upright, visited_by_nearest
@@ -28,7 +23,7 @@ from uavexp.mission import unforeseen
 from uavexp.mission.coverage import Coverage, reachable_m, visible_anywhere
 from uavexp.mission.tour_guide import Look, TourGuide
 from uavexp.scene import Scene
-from uavexp.types import Float, Limits, Observation, Outcome, State, Surface, World
+from uavexp.types import Limits, Observation, Outcome, State, Surface, World
 
 LOOK_S = 0.2  # between the instants at which the camera earns coverage
 

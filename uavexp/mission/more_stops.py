@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from uavexp.arrays import Bool, Float
+from uavexp.field import DistanceField
 from uavexp.inspection.lattice import lattice_of
 from uavexp.inspection.plan import Settings, path_from, sparse_places
 from uavexp.inspection.reference import Surface
 from uavexp.inspection.travel import is_reachable, travel_lengths, travel_matrix
 from uavexp.inspection.viewpoints import Viewpoints, added
 from uavexp.inspection.visibility import Camera, Grid, Views, witnesses
-from uavexp.mapping.base import DistanceField
-from uavexp.types import Bool, Float, Observation
+from uavexp.types import Observation
 
 
 def more_stops(

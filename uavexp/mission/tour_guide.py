@@ -21,6 +21,7 @@ from functools import cache, partial
 
 import numpy as np
 
+from uavexp.arrays import Bool, Float
 from uavexp.geometry import wrap_angle, yaw_of
 from uavexp.inspection.plan import InspectionPlan, Settings, adapt_order
 from uavexp.inspection.view_angle import Weights, cell_weights, choose_yaw
@@ -28,8 +29,8 @@ from uavexp.inspection.viewpoints import Viewpoints
 from uavexp.inspection.visibility import Camera, visible_cells
 from uavexp.mission.give_way import HORIZON_S, aside_m, room_along_m, rooms_m
 from uavexp.mission.more_stops import live_grid, more_stops
-from uavexp.planner.moving import turns_s
-from uavexp.types import Bool, Float, Goal, Limits, Observation
+from uavexp.planner.movers.moving import turns_s
+from uavexp.types import Goal, Limits, Observation
 
 Free = Callable[[int], bool]  # whether no mover comes near on the way to a stop, or there
 

@@ -11,9 +11,10 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from uavexp.arrays import Bool, Float, Float32, Int, Int32
 from uavexp.errors import WorldError
 from uavexp.scene import Scene
-from uavexp.types import Bool, Float, Float32, Int, Int32, Surface, World
+from uavexp.types import Surface, World
 from uavexp.world import task
 from uavexp.world.boxes import Boxes
 

@@ -15,12 +15,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from uavexp.arrays import Float, UInt8
 from uavexp.errors import WorldError, require, require_non_negative, require_positive
 from uavexp.movers.motion import POSITION, REST, WAY, Mode, advance, is_blocked
 from uavexp.movers.placing import Air
 from uavexp.movers.timeline import Timeline, row_of
 from uavexp.scene import Scene
-from uavexp.types import Bodies, Float, Limits, Shape, UInt8, World
+from uavexp.types import Bodies, Limits, Shape, World
 
 _CHUNK = 1000  # rows made at once
 _ATTEMPTS = 300  # drawings of a mover before giving up

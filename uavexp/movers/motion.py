@@ -19,9 +19,9 @@ from enum import IntEnum
 import numba as nb
 import numpy as np
 
+from uavexp.arrays import Float, UInt8
 from uavexp.movers.timeline import ROW_S
 from uavexp.triangle_grid import TriangleGrid, box_meets_mesh
-from uavexp.types import Float, UInt8
 
 
 class Mode(IntEnum):

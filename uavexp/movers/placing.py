@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
+from uavexp.arrays import Bool, Float
 from uavexp.errors import WorldError
 from uavexp.scene import Scene
-from uavexp.types import Bool, Float, World
+from uavexp.types import World
 from uavexp.world.task import LAYER_CELL_M, free_layer
 
 FLOOR_GAP_M = 0.02  # under those that stand: so that the floor does not block them

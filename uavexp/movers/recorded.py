@@ -21,13 +21,14 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
+from uavexp.arrays import Bool, Float
 from uavexp.bodies import ABSENT_M
 from uavexp.errors import WorldError, require, require_non_negative, require_positive
 from uavexp.movers.placing import FLOOR_GAP_M, Air
 from uavexp.movers.timeline import ROW_S, Timeline, row_of
 from uavexp.movers.tracks_file import read_tracks
 from uavexp.scene import Scene
-from uavexp.types import Bodies, Bool, Float, Limits, Shape, World
+from uavexp.types import Bodies, Limits, Shape, World
 
 _TEST_ROWS = 10  # between the places that are tested for room
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from uavexp.types import Bodies, Float, UInt8
+from uavexp.arrays import Float, UInt8
+from uavexp.types import Bodies
 
 ROW_S = 0.01  # between two rows; between them bodies go on at their velocity
 

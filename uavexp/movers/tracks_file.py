@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
+from uavexp.arrays import Float
 from uavexp.errors import WorldError
-from uavexp.types import Float
 
 COLUMNS = ("t_s", "id", "x_m", "y_m")
 

@@ -17,13 +17,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from uavexp.arrays import Float, Int
 from uavexp.errors import require, require_non_negative, require_positive
-from uavexp.mapping.base import DistanceField
+from uavexp.field import DistanceField
+from uavexp.planner.find.grid import FoundPath
+from uavexp.planner.find.voxel import live
+from uavexp.planner.find.voxel.grid import VoxelGrid, VoxelPath
 from uavexp.planner.min_acc import MinAcc
-from uavexp.planner.search import FoundPath
-from uavexp.planner.voxel import live
-from uavexp.planner.voxel.grid import VoxelGrid, VoxelPath
-from uavexp.types import Float, Int, Limits, PlanRequest, PlanResult
+from uavexp.types import Limits, PlanRequest, PlanResult
 
 
 @dataclass(slots=True, kw_only=True)
@@ -87,6 +88,6 @@ class Astar:
 
 
 if __name__ == "__main__":
-    from uavexp.planner.voxel.benchmark import main
+    from uavexp.planner.find.voxel.benchmark import main
 
     sys.exit(main(sys.argv[1:]))

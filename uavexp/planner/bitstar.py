@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from uavexp.planner.ompl_planner import OmplPlanner
-from uavexp.planner.sampling import require_whole
+from uavexp.planner.find.ompl_planner import OmplPlanner
+from uavexp.planner.find.sampling import require_whole
 
 
 @dataclass(slots=True, kw_only=True)

@@ -30,13 +30,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from uavexp.errors import require, require_non_negative, require_positive
-from uavexp.planner.escape import stops
-from uavexp.planner.moving import MovingObstacles
+from uavexp.planner.find.grid import PathSearch
+from uavexp.planner.movers.escape import stops
+from uavexp.planner.movers.moving import MovingObstacles
 from uavexp.planner.mpc.follow import SLACK_M, Followed, Follower, least_room_m
 from uavexp.planner.mpc.guide import Guide, StaticPlanner, still_holds
 from uavexp.planner.mpc.horizon import horizon_model
-from uavexp.planner.mpc.static_problem import Settings
-from uavexp.planner.search import PathSearch
+from uavexp.planner.shape.static_problem import Settings
 from uavexp.types import Limits, PlanRequest, PlanResult, PlanStatus, Tracks
 
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from uavexp.errors import require, require_non_negative, require_option, require_positive
-from uavexp.planner.among import plan_among
-from uavexp.planner.search import PathSearch
-from uavexp.planner.smoothing.bspline_qp import BsplineSmoother, Derivative
+from uavexp.planner.find.grid import PathSearch
+from uavexp.planner.movers.among import plan_among
+from uavexp.planner.shape.corridor_qp import BsplineSmoother, Derivative
 from uavexp.types import Limits, PlanRequest, PlanResult, PlanStatus
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from uavexp.types import Float, PlanRequest
+from uavexp.arrays import Float
+from uavexp.types import PlanRequest
 
 _START_SLACK_M = 0.01  # by which a start below the hard limit may come closer still
 

@@ -32,17 +32,25 @@ from enum import StrEnum
 
 import numpy as np
 
+from uavexp.arrays import Float
 from uavexp.errors import require, require_non_negative, require_option, require_positive
-from uavexp.planner.among import plan_among
-from uavexp.planner.batch_tree import Budget, Found, search
-from uavexp.planner.edges import Rule
-from uavexp.planner.free_space import FreeSpace, for_motions, straight_is_free
-from uavexp.planner.motion import cubic_coefficients
-from uavexp.planner.sampling import FoundWay, finish, refusal, require_known_or_not, require_whole, space_of
-from uavexp.planner.smoothing import Smoothing, make_smoother
-from uavexp.planner.smoothing.base import Smoother
-from uavexp.planner.timing import STEP_M, resample, smooth, time_profile
-from uavexp.types import Float, Limits, PlanRequest, PlanResult
+from uavexp.planner.find.free_space import FreeSpace, for_motions, straight_is_free
+from uavexp.planner.find.sampling import (
+    FoundWay,
+    finish,
+    refusal,
+    require_known_or_not,
+    require_whole,
+    space_of,
+)
+from uavexp.planner.find.tree.batch import Budget, Found, search
+from uavexp.planner.find.tree.edges import Rule
+from uavexp.planner.find.tree.motion import cubic_coefficients
+from uavexp.planner.movers.among import plan_among
+from uavexp.planner.shape import Smoothing, make_smoother
+from uavexp.planner.shape.base import Smoother
+from uavexp.planner.shape.timing import STEP_M, resample, smooth, time_profile
+from uavexp.types import Limits, PlanRequest, PlanResult
 
 _NO_SEEDS = np.zeros((0, 6)), 0.0
 _SAMPLE_M = 0.1  # spacing of the points handed to the smoother

@@ -17,14 +17,15 @@ from functools import partial
 
 import numpy as np
 
+from uavexp.arrays import Float, Int
 from uavexp.errors import require_non_negative, require_option, require_positive
-from uavexp.mapping.base import DistanceField
+from uavexp.field import DistanceField
+from uavexp.planner.find.grid import FoundPath
+from uavexp.planner.find.voxel import directed, live
+from uavexp.planner.find.voxel.canonical import BUDGET
+from uavexp.planner.find.voxel.grid import Turning, VoxelGrid, VoxelPath
 from uavexp.planner.min_acc import MinAcc
-from uavexp.planner.search import FoundPath
-from uavexp.planner.voxel import directed, live
-from uavexp.planner.voxel.canonical import BUDGET
-from uavexp.planner.voxel.grid import Turning, VoxelGrid, VoxelPath
-from uavexp.types import Float, Int, Limits, PlanRequest, PlanResult
+from uavexp.types import Limits, PlanRequest, PlanResult
 
 _SLOW_MPS = 0.1  # a slower start has no direction
 

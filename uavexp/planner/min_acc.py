@@ -35,16 +35,22 @@ from functools import partial
 
 import numpy as np
 
+from uavexp.braking import braking_trajectory, jerk_mps3
 from uavexp.errors import require, require_non_negative, require_positive
-from uavexp.geometry import evaluate, sample_times
-from uavexp.mapping.base import DistanceField
-from uavexp.planner.brake import braking_trajectory, jerk_mps3
-from uavexp.planner.escape import safest_stop
-from uavexp.planner.optimise import CONTROL_POINTS, Settings, fixed_shortfall, moving_obstacles, optimise
-from uavexp.planner.search import Finder, PathSearch
-from uavexp.planner.spline import spline_model, to_trajectory
-from uavexp.planner.stop_first import stop_first, summed
-from uavexp.types import Limits, PlanRequest, PlanResult, PlanStatus, Trajectory
+from uavexp.field import DistanceField
+from uavexp.planner.find.grid import Finder, PathSearch
+from uavexp.planner.movers.escape import safest_stop
+from uavexp.planner.shape.optimise import (
+    CONTROL_POINTS,
+    Settings,
+    fixed_shortfall,
+    moving_obstacles,
+    optimise,
+)
+from uavexp.planner.shape.stop_first import stop_first, summed
+from uavexp.planner.spline.cubic import spline_model, to_trajectory
+from uavexp.trajectory import Trajectory, evaluate, sample_times
+from uavexp.types import Limits, PlanRequest, PlanResult, PlanStatus
 
 _MENDED_BY_BRAKING = (PlanStatus.NOT_CLEAR, PlanStatus.LIMITS, PlanStatus.SOLVER)
 _REST_MPS = 0.05  # a slower start counts as standing

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from uavexp.errors import require, require_non_negative, require_positive
-from uavexp.planner.ompl_planner import OmplPlanner
+from uavexp.planner.find.ompl_planner import OmplPlanner
 
 
 @dataclass(slots=True, kw_only=True)

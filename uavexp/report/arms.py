@@ -20,18 +20,11 @@ from uavexp.errors import RecordError
 from uavexp.paths import experiments_folder
 from uavexp.report import cells, shown
 from uavexp.report.comparison import Metric, Panel, estimate
-from uavexp.report.findings import (
-    FAILED,
-    INTERVALS,
-    Findings,
-    circumstances,
-    study_panel,
-    values_table,
-)
+from uavexp.report.findings import FAILED, INTERVALS, Findings, circumstances, study_panel, values_table
 from uavexp.report.paired import RULE, PairedTest, comparisons_table, evidence, paired_tests, verdict
 from uavexp.report.parts import Claim, Table, Verdict
 from uavexp.report.reference import Reference, read_reference
-from uavexp.study import Study
+from uavexp.store.study import Study
 
 CONTRADICTIONS = "contradictions.csv"
 _COLUMNS = ("printed", "check", "so")

@@ -10,11 +10,11 @@ from functools import cached_property
 import numpy as np
 import pandas as pd
 
+from uavexp.arrays import Bool, Float, Int
 from uavexp.errors import RecordError
 from uavexp.report import significance, statistics
 from uavexp.report.significance import Alternative
 from uavexp.report.statistics import Interval
-from uavexp.types import Bool, Float, Int
 
 FEWEST_SCENES = 6  # with fewer, sign flips of scenes cannot give p < 0.05, nor the bootstrap 95 %
 SUCCESS = "success"

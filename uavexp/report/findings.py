@@ -11,8 +11,8 @@ import pandas as pd
 from uavexp.report import cells
 from uavexp.report.comparison import FEWEST_SCENES, SCENE, Metric, Panel, estimate, panel_of
 from uavexp.report.parts import Claim, Table
-from uavexp.study import Study
-from uavexp.table import pooled_versions
+from uavexp.store.study import Study
+from uavexp.store.table import pooled_versions
 
 OK = "ok"  # status of a trial that ran to its end
 

@@ -12,13 +12,14 @@ from typing import Any
 
 import numpy as np
 
+from uavexp.arrays import Float, Int
 from uavexp.bodies import present
 from uavexp.metrics import path, replanning, tracking
 from uavexp.report import style
 from uavexp.report.figures import flown
 from uavexp.report.figures.looks import looks_of
-from uavexp.study import Study
-from uavexp.types import Float, Int, Replan, TrialLog, World
+from uavexp.store.study import Study
+from uavexp.types import Replan, TrialLog, World
 
 MOST_POINTS = 600  # of a path
 _ABOVE_FLIGHT_M = 0.3  # the map is cut here at first, so that one looks into the rooms

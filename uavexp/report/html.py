@@ -11,15 +11,15 @@ from typing import Any
 import pandas as pd
 
 from uavexp.errors import RecordError
-from uavexp.records import PICTURE, write_text
 from uavexp.report import flight3d
 from uavexp.report.comparison import SCENE
 from uavexp.report.figures import flown, missing
 from uavexp.report.findings import OK, circumstances, study_panel
 from uavexp.report.parts import Claim, Drawing, Table, Verdict
 from uavexp.report.shown import RATE
-from uavexp.study import TRIALS, Study, read_runs, read_wall
-from uavexp.table import TABLE
+from uavexp.store.records import PICTURE, write_text
+from uavexp.store.study import TRIALS, Study, read_runs, read_wall
+from uavexp.store.table import TABLE
 
 MOST_FAILED = 300  # rows of the table of failed trials
 _MARKS = {Verdict.REPRODUCED: "✓", Verdict.NOT_REPRODUCED: "✗", Verdict.NOT_TESTABLE: "–"}

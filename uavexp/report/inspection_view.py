@@ -9,9 +9,10 @@ import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
 
+from uavexp.arrays import Bool, Float
 from uavexp.metrics import clearance, coverage, path
 from uavexp.report import movers_view, plan_view, style
-from uavexp.types import Bool, Float, TrialLog, World
+from uavexp.types import TrialLog, World
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

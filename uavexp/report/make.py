@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import IO, Any
 
 from uavexp.errors import RecordError
-from uavexp.records import RECORD, write_atomically, write_text
 from uavexp.report import arms, policies, robustness, style, summary, table1, tables, tradeoff
 from uavexp.report.findings import Findings
 from uavexp.report.parts import Drawing, Table
-from uavexp.study import Study, collect, read_study, trial_folders
-from uavexp.table import REPLANS, TABLE
+from uavexp.store.records import RECORD, write_atomically, write_text
+from uavexp.store.study import Study, collect, read_study, trial_folders
+from uavexp.store.table import REPLANS, TABLE
 
 PAGE, CLAIMS = "report.html", "claims"
 TABLES, FIGURES = "tables", "figures"

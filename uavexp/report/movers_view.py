@@ -13,10 +13,11 @@ from matplotlib.colors import to_rgb, to_rgba
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch, Rectangle
 
+from uavexp.arrays import Bool, Float
 from uavexp.bodies import distance_m, present
 from uavexp.metrics.tracking_movers import GATE_M, near_miss_spans
 from uavexp.report import style
-from uavexp.types import Bodies, Bool, Float, Replan, Shape, TrialLog
+from uavexp.types import Bodies, Replan, Shape, TrialLog
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,9 +11,10 @@ from matplotlib.colors import LinearSegmentedColormap, ListedColormap, Normalize
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MultipleLocator
 
+from uavexp.arrays import Float
 from uavexp.metrics import replanning
 from uavexp.report import movers_view, section, style
-from uavexp.types import Float, TrialLog, World
+from uavexp.types import TrialLog, World
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

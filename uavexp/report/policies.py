@@ -7,7 +7,7 @@ import numpy as np
 from uavexp.report import shown
 from uavexp.report.findings import Findings, arms_table, circumstances, study_panel, values_table
 from uavexp.report.paired import comparisons_table, paired_tests
-from uavexp.study import Study
+from uavexp.store.study import Study
 
 FLIGHT = (
     shown.RATE,

@@ -33,7 +33,7 @@ from uavexp.report.findings import (
 from uavexp.report.paired import PairedTest, evidence, paired_tests, verdict
 from uavexp.report.parts import Claim, Table, Verdict
 from uavexp.report.statistics import Interval
-from uavexp.study import Study
+from uavexp.store.study import Study
 
 ARM = "arm"
 NOISE, LATENCY, DRIFT = "noise", "latency", "drift"

@@ -8,7 +8,8 @@ import numba as nb
 import numpy as np
 from scipy import ndimage
 
-from uavexp.types import Float, UInt8, World
+from uavexp.arrays import Float, UInt8
+from uavexp.types import World
 
 OPEN, SOLID, SURFACE = 0, 1, 2  # values of `Section.cells`
 

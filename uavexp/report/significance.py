@@ -13,8 +13,8 @@ from typing import Literal
 import numpy as np
 from scipy import stats
 
+from uavexp.arrays import Bool, Float
 from uavexp.report.statistics import LEVEL, Interval, Labels
-from uavexp.types import Bool, Float
 
 Alternative = Literal["two-sided", "greater", "less"]
 

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-from uavexp.types import Bool, Float
+from uavexp.arrays import Bool, Float
 
 LEVEL = 0.95
 RESAMPLES, RESAMPLES_OF_MANY = 4000, 2000

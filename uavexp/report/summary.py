@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from uavexp.report import shown
 from uavexp.report.findings import Findings, arms_table, circumstances, study_panel, values_table
-from uavexp.study import Study
+from uavexp.store.study import Study
 
 METRICS = (*shown.TABLE_1, shown.DETOUR, shown.UNSAFE)
 

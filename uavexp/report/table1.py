@@ -9,6 +9,7 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
+from uavexp.arrays import Float
 from uavexp.report import cells, shown
 from uavexp.report.claims import claims_of
 from uavexp.report.comparison import SCENE, Metric, Panel, estimate
@@ -25,8 +26,7 @@ from uavexp.report.findings import (
 from uavexp.report.paired import RULE, comparisons_table, paired_tests
 from uavexp.report.parts import Table
 from uavexp.report.reference import Reference, read_reference
-from uavexp.study import Study
-from uavexp.types import Float
+from uavexp.store.study import Study
 
 _SPREAD = (
     "Mean ± standard deviation over flights; of the success rate over the scenes' rates. Flights that "

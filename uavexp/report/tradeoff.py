@@ -12,13 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from uavexp.arrays import Bool, Float
 from uavexp.report import cells, shown
 from uavexp.report.comparison import Difference, Panel, compare, estimate, pairs_of
 from uavexp.report.findings import Findings, arms_table, circumstances, study_panel, values_table
 from uavexp.report.parts import Claim, Table, Verdict
 from uavexp.report.significance import ALPHA, holm, smallest_p
-from uavexp.study import Study
-from uavexp.types import Bool, Float
+from uavexp.store.study import Study
 
 METRICS = (
     shown.RATE,

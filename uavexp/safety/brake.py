@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from uavexp.braking import stopping_distance_m
 from uavexp.errors import require, require_non_negative
-from uavexp.geometry import evaluate, sample_times
-from uavexp.planner.brake import stopping_distance_m
+from uavexp.trajectory import evaluate, sample_times
 from uavexp.types import Limits, Observation
 
 _SAMPLE_S = 0.04  # at 2.5 m/s one voxel apart

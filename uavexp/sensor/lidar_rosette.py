@@ -16,10 +16,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from uavexp.arrays import Float, Float32
 from uavexp.errors import require
 from uavexp.scene import Scene
 from uavexp.sensor.lidar import LidarParameters, take_scan
-from uavexp.types import Float, Float32, RayScan, State
+from uavexp.types import RayScan, State
 
 
 def rosette(times_s: Float, field_of_view_deg: float, prism_rates_hz: tuple[float, float]) -> Float32:

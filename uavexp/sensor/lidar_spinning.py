@@ -6,10 +6,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from uavexp.arrays import Float32
 from uavexp.errors import require
 from uavexp.scene import Scene
 from uavexp.sensor.lidar import LidarParameters, take_scan
-from uavexp.types import Float32, RayScan, State
+from uavexp.types import RayScan, State
 
 
 @dataclass(slots=True, kw_only=True)

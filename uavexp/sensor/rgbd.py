@@ -28,11 +28,12 @@ from dataclasses import dataclass, field
 import numba as nb
 import numpy as np
 
+from uavexp.arrays import Float, Float32
 from uavexp.errors import require, require_non_negative, require_positive
 from uavexp.geometry import rotation_from_quaternion
 from uavexp.scene import Scene
 from uavexp.sensor.mount import require_mount
-from uavexp.types import DepthScan, Float, Float32, State
+from uavexp.types import DepthScan, State
 
 
 @nb.njit(cache=True)

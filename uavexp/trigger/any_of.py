@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from uavexp.errors import require
-from uavexp.mapping.base import DistanceField
+from uavexp.field import DistanceField
+from uavexp.trajectory import Trajectory
 from uavexp.trigger.base import TriggerPolicy
-from uavexp.types import Decision, Limits, Observation, Trajectory
+from uavexp.types import Decision, Limits, Observation
 
 
 @dataclass(slots=True, kw_only=True)

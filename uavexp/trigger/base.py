@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from uavexp.mapping.base import DistanceField
-from uavexp.types import Decision, Limits, Observation, Trajectory
+from uavexp.field import DistanceField
+from uavexp.trajectory import Trajectory
+from uavexp.types import Decision, Limits, Observation
 
 
 class TriggerPolicy(Protocol):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
-from uavexp.types import Float, Float32, Int, Int32
+from uavexp.arrays import Float, Float32, Int, Int32
 
 
 @nb.njit(cache=True)

@@ -11,9 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from uavexp.errors import require_positive
-from uavexp.mapping.base import DistanceField
+from uavexp.field import DistanceField
+from uavexp.trajectory import Trajectory
 from uavexp.trigger.validity import clearance_ahead_m, comes_near, ends_within, is_flown
-from uavexp.types import Decision, Limits, Observation, Trajectory
+from uavexp.types import Decision, Limits, Observation
 
 
 @dataclass(slots=True, kw_only=True)

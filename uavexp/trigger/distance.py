@@ -12,10 +12,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from uavexp.errors import require_positive
-from uavexp.geometry import evaluate, polyline_length_m
-from uavexp.mapping.base import DistanceField
+from uavexp.field import DistanceField
+from uavexp.geometry import polyline_length_m
+from uavexp.trajectory import Trajectory, evaluate
 from uavexp.trigger.validity import ends_within, is_flown
-from uavexp.types import Decision, Limits, Observation, Trajectory
+from uavexp.types import Decision, Limits, Observation
 
 _SAMPLE_S = 0.02  # at 2.5 m/s half a voxel
 

@@ -19,7 +19,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from uavexp.errors import require, require_non_negative, require_positive
-from uavexp.mapping.base import DistanceField
+from uavexp.field import DistanceField
+from uavexp.trajectory import Trajectory
 from uavexp.trigger.validity import (
     clearance_ahead_m,
     comes_near,
@@ -28,7 +29,7 @@ from uavexp.trigger.validity import (
     is_older,
     unknown_count,
 )
-from uavexp.types import Decision, Limits, Observation, Trajectory
+from uavexp.types import Decision, Limits, Observation
 
 
 @dataclass(slots=True, kw_only=True)

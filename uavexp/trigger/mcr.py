@@ -24,11 +24,12 @@ from enum import StrEnum
 
 import numpy as np
 
+from uavexp.arrays import Float, Int32
 from uavexp.errors import require, require_non_negative, require_option, require_positive
-from uavexp.geometry import evaluate, sample_times
-from uavexp.mapping.base import DistanceField
+from uavexp.field import DistanceField
+from uavexp.trajectory import Trajectory, evaluate, sample_times
 from uavexp.trigger.change import changed_near
-from uavexp.types import Decision, Float, Goal, Int32, Limits, Observation, Trajectory
+from uavexp.types import Decision, Goal, Limits, Observation
 
 _SAMPLE_S = 0.05  # at 2.5 m/s about one voxel apart
 _NOISE_M = 0.01  # a smaller drop is no drop

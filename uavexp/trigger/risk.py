@@ -37,11 +37,12 @@ from enum import StrEnum
 import numba as nb
 import numpy as np
 
+from uavexp.arrays import Float
 from uavexp.errors import require_non_negative, require_option, require_positive
-from uavexp.geometry import evaluate
-from uavexp.mapping.base import DistanceField
-from uavexp.planner.moving import box_gap
-from uavexp.types import Decision, Float, Limits, Observation, Trajectory
+from uavexp.field import DistanceField
+from uavexp.planner.movers.moving import box_gap
+from uavexp.trajectory import Trajectory, evaluate
+from uavexp.types import Decision, Limits, Observation
 
 _SAMPLE_S = 0.02  # at 5 m/s relative speed 0.1 m: a distance of 0.5 m is right to 3 mm
 _TIME_S = 1e-9  # times are sums of steps

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from uavexp.mapping.base import DistanceField
-from uavexp.types import Decision, Limits, Observation, Trajectory
+from uavexp.field import DistanceField
+from uavexp.trajectory import Trajectory
+from uavexp.types import Decision, Limits, Observation
 
 
 @dataclass(slots=True, kw_only=True)

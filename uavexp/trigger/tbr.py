@@ -6,8 +6,9 @@ import math
 from dataclasses import dataclass, field
 
 from uavexp.errors import require_positive
-from uavexp.mapping.base import DistanceField
-from uavexp.types import Decision, Limits, Observation, Trajectory
+from uavexp.field import DistanceField
+from uavexp.trajectory import Trajectory
+from uavexp.types import Decision, Limits, Observation
 
 
 @dataclass(slots=True, kw_only=True)

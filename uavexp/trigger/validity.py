@@ -11,9 +11,10 @@ from typing import TypeGuard
 
 import numpy as np
 
-from uavexp.geometry import evaluate
-from uavexp.mapping.base import UNKNOWN, DistanceField
-from uavexp.types import Float, Goal, Trajectory
+from uavexp.arrays import Float
+from uavexp.field import UNKNOWN, DistanceField
+from uavexp.trajectory import Trajectory, evaluate
+from uavexp.types import Goal
 
 _SAMPLE_S = 0.05  # at 2.5 m/s about one voxel apart
 _SLACK_M = 0.03  # a third of a voxel: what the map's distances are exact to

@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from uavexp.arrays import Float
 from uavexp.bodies import distance_m
 from uavexp.geometry import rotation_from_quaternion
-from uavexp.types import Bodies, Contact, Float, State
+from uavexp.types import Bodies, Contact, State
 from uavexp.vehicle.slide import between, stopped
 
 if TYPE_CHECKING:

@@ -16,9 +16,10 @@ from dataclasses import dataclass, field
 import numba as nb
 import numpy as np
 
+from uavexp.arrays import Float
 from uavexp.errors import require_positive
 from uavexp.geometry import GRAVITY_MPS2
-from uavexp.types import Command, Float, Limits, State
+from uavexp.types import Command, Limits, State
 
 
 @nb.njit(cache=True)

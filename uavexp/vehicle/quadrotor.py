@@ -28,9 +28,10 @@ from typing import NamedTuple
 import numba as nb
 import numpy as np
 
+from uavexp.arrays import Float
 from uavexp.errors import require, require_non_negative, require_positive
 from uavexp.geometry import GRAVITY_MPS2
-from uavexp.types import Command, Float, Limits, State
+from uavexp.types import Command, Limits, State
 
 # layout of the state vector of the kernels
 _P, _V, _Q, _W, _ROTOR, _SIZE = 0, 3, 6, 10, 13, 17

@@ -22,9 +22,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numba as nb
 import numpy as np
 
+from uavexp.arrays import Float
 from uavexp.bodies import separating_planes
 from uavexp.geometry import rotation_from_quaternion
-from uavexp.types import Bodies, Float, State
+from uavexp.types import Bodies, State
 
 if TYPE_CHECKING:
     from uavexp.scene import Scene

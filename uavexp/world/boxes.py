@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from uavexp.types import Float, Float32, Int32
+from uavexp.arrays import Float, Float32, Int32
 
 WALL_M = 0.15  # thickness of floor, ceiling and outer walls, outside the inner box
 _CORNERS = np.array([[i, j, k] for i in (-0.5, 0.5) for j in (-0.5, 0.5) for k in (-0.5, 0.5)])

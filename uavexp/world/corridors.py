@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from uavexp.arrays import Bool, Float
 from uavexp.errors import require, require_non_negative, require_positive
-from uavexp.types import Bool, Float, World
+from uavexp.types import World
 from uavexp.world import indoor
 from uavexp.world.boxes import Boxes
 

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
+from uavexp.arrays import Bool, Float, Float32, Int32
 from uavexp.errors import WorldError, require, require_non_negative, require_positive
 from uavexp.scene import Scene
-from uavexp.types import Bool, Float, Float32, Int32, World
+from uavexp.types import World
 from uavexp.world import readers, ros_map, task
 from uavexp.world.voxel_mesh import exposed_faces
 

@@ -7,9 +7,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from uavexp.arrays import Float
 from uavexp.errors import WorldError, require, require_positive
 from uavexp.scene import Scene
-from uavexp.types import Float, World
+from uavexp.types import World
 from uavexp.world import task
 from uavexp.world.boxes import WALL_M, Boxes
 

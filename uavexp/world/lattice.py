@@ -16,8 +16,8 @@ import math
 import numba as nb
 import numpy as np
 
+from uavexp.arrays import Bool, Float, Int, UInt8
 from uavexp.triangle_grid import TriangleGrid, ball_meets_mesh, box_meets_mesh
-from uavexp.types import Bool, Float, Int, UInt8
 
 SIGHT_STEP_M = 0.05  # between the points tested along a line of sight
 _UNTESTED, _BLOCKED, _PASSABLE, _PASSABLE_END = 0, 1, 2, 3

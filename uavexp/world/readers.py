@@ -18,9 +18,9 @@ from pathlib import Path
 
 import numpy as np
 
+from uavexp.arrays import Float, Int32
 from uavexp.errors import WorldError
 from uavexp.o3d import open3d
-from uavexp.types import Float, Int32
 
 MESHES = (".ply", ".obj", ".stl", ".glb")
 CLOUDS = (".pcd", ".ply")

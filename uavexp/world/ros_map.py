@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import yaml  # type: ignore[import-untyped]  # with omegaconf
 
+from uavexp.arrays import Bool, Float
 from uavexp.errors import WorldError
-from uavexp.types import Bool, Float
 
 MAX_PIXELS = 100_000_000
 

@@ -13,9 +13,10 @@ from itertools import pairwise
 import numpy as np
 from scipy import ndimage
 
+from uavexp.arrays import Float, Float32, Int32
 from uavexp.geometry import polyline_length_m
 from uavexp.scene import Scene
-from uavexp.types import Difficulty, Float, Float32, Int32, World
+from uavexp.types import Difficulty, World
 from uavexp.world import lattice
 
 CELL_M = 0.1  # spacing of the lattice on which the shortest path is exact

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
-from uavexp.types import Bool, Float, Float32, Int, Int32
+from uavexp.arrays import Bool, Float, Float32, Int, Int32
 
 
 def exposed_faces(occupied: Bool, origin_m: Float, voxel_m: Float) -> tuple[Float32, Int32]:

@@ -6,9 +6,10 @@ import numba as nb
 import numpy as np
 from scipy import ndimage
 
+from uavexp.arrays import Bool, Float, Float32, Int, Int32
 from uavexp.errors import require, require_positive
 from uavexp.triangle_grid import box_meets_triangle
-from uavexp.types import Bool, Float, Float32, Int, Int32, World
+from uavexp.types import World
 
 _MAX_VOXELS = 1 << 31
 

@@ -7,14 +7,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uavexp.geometry import evaluate
-from uavexp.planner.brake import with_stop
-from uavexp.planner.moving import MovingObstacles
+from uavexp.arrays import Float
+from uavexp.braking import with_stop
+from uavexp.planner.movers.moving import MovingObstacles
 from uavexp.planner.mpc.guide import Guide, StaticPlanner, phase_of
 from uavexp.planner.mpc.horizon import HorizonModel, Motion, Scene, Tracked, to_trajectory, track
 from uavexp.planner.mpc.rejoin import BLENDS_S, rejoined, state_at
-from uavexp.planner.mpc.static_spline import instants, limit_excess
-from uavexp.types import Float, Limits, PlanRequest, Trajectory
+from uavexp.planner.shape.static_spline import instants, limit_excess
+from uavexp.trajectory import Trajectory, evaluate
+from uavexp.types import Limits, PlanRequest
 
 SLACK_M = 1e-3  # more than this is a region that was not kept out of
 _ABOVE_M = 0.02  # clearance inside the horizon above the limit: room between its steps

@@ -8,14 +8,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uavexp.geometry import evaluate
-from uavexp.planner.brake import braking_trajectory, stopping_distance_m
+from uavexp.arrays import Float
+from uavexp.braking import braking_trajectory, stopping_distance_m
 from uavexp.planner.clearance import shortfall
-from uavexp.planner.mpc.static_problem import Settings
-from uavexp.planner.mpc.static_spline import START_EXCESS, instants, shape_spline
-from uavexp.planner.search import PathSearch
-from uavexp.planner.stop_first import stop_first
-from uavexp.types import Float, Goal, PlanRequest, PlanResult, PlanStatus, Trajectory
+from uavexp.planner.find.grid import PathSearch
+from uavexp.planner.shape.static_problem import Settings
+from uavexp.planner.shape.static_spline import START_EXCESS, instants, shape_spline
+from uavexp.planner.shape.stop_first import stop_first
+from uavexp.trajectory import Trajectory, evaluate
+from uavexp.types import Goal, PlanRequest, PlanResult, PlanStatus
 
 _MENDED_BY_BRAKING = (PlanStatus.NOT_CLEAR, PlanStatus.LIMITS, PlanStatus.SOLVER)
 _REST_MPS = 0.05  # a slower start counts as standing

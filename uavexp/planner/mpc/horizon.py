@@ -26,11 +26,13 @@ import daqp
 import numba as nb
 import numpy as np
 
-from uavexp.mapping.base import DistanceField
-from uavexp.planner.brake import jerk_mps3
+from uavexp.arrays import Float, Int
+from uavexp.braking import jerk_mps3
+from uavexp.field import DistanceField
 from uavexp.planner.mpc.regions import mover_planes, static_planes
-from uavexp.planner.mpc.static_cost import FAN, frames
-from uavexp.types import Float, Int, Limits, Trajectory
+from uavexp.planner.shape.static_cost import FAN, frames
+from uavexp.trajectory import Trajectory
+from uavexp.types import Limits
 
 _SLACK_PRICE, _SLACK_BEND = 200.0, 2000.0  # ρ per m and per m²
 _QP_SHARE = 0.97  # of the limits inside the QP: room for its linearisation and between steps

@@ -15,9 +15,9 @@ import math
 import numba as nb
 import numpy as np
 
-from uavexp.mapping.field import value_and_gradient
-from uavexp.planner.moving import HORIZON, INSET, TURN, grown_m, moved_s
-from uavexp.types import Float, Float32, Int
+from uavexp.arrays import Float, Float32, Int
+from uavexp.field import value_and_gradient
+from uavexp.planner.movers.moving import HORIZON, INSET, TURN, grown_m, moved_s
 
 _AROUND_M = 0.25  # how far to the sides the static field is asked
 _REACH_M = 0.8  # a region farther than this from the predicted motion is no matter of this QP

@@ -7,9 +7,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from uavexp.geometry import evaluate
-from uavexp.planner.spline import join
-from uavexp.types import Float, Trajectory
+from uavexp.arrays import Float
+from uavexp.trajectory import Trajectory, evaluate, join
 
 BLENDS_S = (0.5, 1.0, 2.0, 3.0)  # durations of the quintic, tried in turn
 _LOOKS = 12  # instants of a quintic that are looked at before all else

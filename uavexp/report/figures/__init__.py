@@ -31,7 +31,7 @@ from uavexp.report.figures.looks import clock_arm, looks_of, primary_arm
 from uavexp.report.findings import circumstances, study_panel
 from uavexp.report.parts import Drawing
 from uavexp.report.reference import read_reference
-from uavexp.study import Study
+from uavexp.store.study import Study
 
 _PLANE = (shown.RATE, shown.CLEARANCE, shown.REPLANS)
 _SAFETY_M = 0.30  # m; where a study does not say (`metrics.summary`)

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.lines import Line2D
 
+from uavexp.arrays import Float
 from uavexp.metrics import replanning
 from uavexp.report import plan_view, style
 from uavexp.report.figures import canvas
 from uavexp.report.figures.flown import SharedWorld
 from uavexp.report.figures.over_time import draw_replans
 from uavexp.report.parts import Drawing
-from uavexp.types import Float, Replan, TrialLog, World
+from uavexp.types import Replan, TrialLog, World
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
+from uavexp.arrays import Float
 from uavexp.report.comparison import arm_names
 from uavexp.report.figures import canvas
 from uavexp.report.figures.looks import Look
 from uavexp.report.findings import arm_axes
 from uavexp.report.parts import Drawing
-from uavexp.study import Study
-from uavexp.types import Float
+from uavexp.store.study import Study
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

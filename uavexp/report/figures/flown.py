@@ -11,7 +11,7 @@ from uavexp.errors import RecordError
 from uavexp.report.comparison import SCENE, arm_names
 from uavexp.report.figures.looks import clock_arm, primary_arm
 from uavexp.report.findings import OK, arm_axes, arms_flown
-from uavexp.study import TRIALS, WORLDS, Study
+from uavexp.store.study import TRIALS, WORLDS, Study
 from uavexp.types import TrialLog, World
 
 RULE = "lowest seed with a stored log of every arm shown"

@@ -8,13 +8,14 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
+from uavexp.arrays import Float
 from uavexp.metrics import coverage
 from uavexp.report import inspection_view, movers_view, plan_view
 from uavexp.report.figures import canvas, flown
 from uavexp.report.figures.looks import Look
 from uavexp.report.parts import Drawing
-from uavexp.study import Study
-from uavexp.types import Float, TrialLog, World
+from uavexp.store.study import Study
+from uavexp.types import TrialLog, World
 
 KIND = "scene_kind"  # column: what the reference does not show
 _LEGEND_IN, _TITLE_IN, _AXIS_IN = 1.0, 0.4, 0.45

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from uavexp.report import style
-from uavexp.study import Study
+from uavexp.store.study import Study
 
 
 @dataclass(frozen=True, slots=True)

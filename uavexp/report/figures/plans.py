@@ -10,14 +10,15 @@ from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from uavexp.geometry import evaluate
+from uavexp.arrays import Float
 from uavexp.metrics import plan
 from uavexp.report import plan_view, style
 from uavexp.report.figures import canvas
 from uavexp.report.figures.flown import RULE, SharedWorld
 from uavexp.report.figures.looks import Look
 from uavexp.report.parts import Drawing
-from uavexp.types import Float, Trajectory, TrialLog
+from uavexp.trajectory import Trajectory, evaluate
+from uavexp.types import TrialLog
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -17,7 +17,7 @@ from uavexp.report.figures.looks import CLOCK, OTHERS, PRIMARY, Look, primary_ar
 from uavexp.report.findings import arms_flown
 from uavexp.report.parts import Drawing
 from uavexp.report.robustness import ARM, DRIFT, FALSE_TRIGGERS, LATENCY, NOISE, with_false_triggers
-from uavexp.study import Study
+from uavexp.store.study import Study
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,13 +9,13 @@ import numpy as np
 import pandas as pd
 from matplotlib.lines import Line2D
 
+from uavexp.arrays import Float, Int
 from uavexp.report import shown, style
 from uavexp.report.comparison import Panel, estimate
 from uavexp.report.figures import canvas
 from uavexp.report.figures.looks import Look
 from uavexp.report.parts import Drawing
 from uavexp.report.reference import Reference
-from uavexp.types import Float, Int
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -16,7 +16,7 @@ from uavexp.report.figures import canvas
 from uavexp.report.figures.flown import ARM
 from uavexp.report.figures.looks import Look
 from uavexp.report.parts import Drawing
-from uavexp.study import Study
+from uavexp.store.study import Study
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

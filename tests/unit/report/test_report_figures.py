@@ -1,0 +1,316 @@
+"""Figures of a report: the numbers of the trials, chosen by the rule they state, at a paper's size."""
+
+from __future__ import annotations
+
+import shutil
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.text import Text
+
+from tests.studies import copy_of, flown, made_up  # noqa: F401
+from uavexp.metrics import replanning
+from uavexp.report import style
+from uavexp.report.figures import canvas, drawings_of, robustness, safety, tradeoff
+from uavexp.report.figures import flown as shown_flights
+from uavexp.report.figures.canvas import png_of
+from uavexp.report.findings import study_panel
+from uavexp.store.study import LOG, TRIALS, WORLDS
+
+WITH_LOGS = {"figure_3", "figure_4", "figure_5", "figure_8"}
+TEXT_PT = 7.0  # the least that is read in print
+
+
+@pytest.fixture(scope="module")
+def drawings(flown):  # noqa: F811
+    return {drawing.name: drawing for drawing in drawings_of(flown)}
+
+
+def rows_of(arms, scenes, seeds, **columns):
+    index = pd.MultiIndex.from_product([arms, scenes, range(seeds)], names=["arm", "scene", "seed"])
+    table = index.to_frame(index=False)
+    trial = [f"t{number}" for number in range(len(table))]
+    fixed = {"strategy": "x", "world": "w", "outcome": "reached", "status": "ok", "trial": trial}
+    return table.assign(**fixed, trigger=table["arm"], **columns)
+
+
+class TestWhatIsDrawn:
+    def test_a_study_with_logs_gets_the_papers_figures(self, drawings):
+        assert {*WITH_LOGS, "figure_6", "figure_7", "figure_9", "success"} <= set(drawings)
+
+    def test_without_logs_the_figures_of_single_flights_are_left_out(self, flown, tmp_path):  # noqa: F811
+        study = copy_of(flown, tmp_path / "bare")
+        shutil.rmtree(study.folder / TRIALS)
+        names = {drawing.name for drawing in drawings_of(study)}
+        assert names >= {"figure_6", "figure_7", "figure_9", "success"}
+        assert not names & {*WITH_LOGS, "figure_10"}
+
+    def test_without_worlds_too(self, flown, tmp_path):  # noqa: F811
+        study = copy_of(flown, tmp_path / "bare")
+        shutil.rmtree(study.folder / WORLDS)
+        assert not {drawing.name for drawing in drawings_of(study)} & {*WITH_LOGS, "figure_10"}
+
+    def test_every_caption_tells_n_and_seeds(self, drawings):
+        for drawing in drawings.values():
+            assert "seed" in drawing.caption, drawing.name
+            assert "n = " in drawing.caption or "trials" in drawing.caption, drawing.name
+
+    def test_the_same_study_gives_the_same_bytes_and_leaves_the_users_style_alone(self, flown):  # noqa: F811
+        with mpl.rc_context({"font.size": 23.0}):
+            again = {drawing.name: drawing for drawing in drawings_of(flown)}
+            assert mpl.rcParams["font.size"] == 23.0
+        with style.house_style():
+            once = {drawing.name: png_of(drawing.figure) for drawing in drawings_of(flown)}
+            for name, drawing in again.items():
+                assert png_of(drawing.figure) == once[name], name
+
+    def test_text_is_legible_in_print_and_the_width_a_papers(self, drawings):
+        for name, drawing in drawings.items():
+            assert drawing.figure.get_figwidth() in (canvas.COLUMN_IN, canvas.PAGE_IN), name
+            for text in drawing.figure.findobj(Text):
+                assert not text.get_text() or text.get_fontsize() >= TEXT_PT, (name, text.get_text())
+
+
+class TestWhichFlights:
+    def test_the_world_shown_is_the_lowest_seed_flown_by_every_arm(self, flown, tmp_path):  # noqa: F811
+        study = copy_of(flown, tmp_path / "holes")
+        flights = shown_flights.flights_of(study)
+        arms, scenes = shown_flights.three_arms(study), shown_flights.scenes_of(study, flights)
+
+        def first():
+            there = shown_flights.stored(study, flights)
+            return next(shown_flights.shared_worlds(study, there, arms, scenes[:1]))
+
+        seeds = sorted(flights["seed"].unique())
+        assert first().seed == seeds[0]
+        assert tuple(first().logs) == arms
+        gone = flights[(flights["seed"] == seeds[0]) & (flights[shown_flights.ARM] == arms[-1])]
+        for trial in gone["trial"]:
+            (study.folder / TRIALS / trial / LOG).unlink()
+        assert first().seed == seeds[1]
+
+    def test_the_three_strategies_are_the_papers_whatever_else_was_flown(self, tmp_path):
+        arms = ("other", "MCR", "SSP", "TBR frequent", "TBR")
+        study = made_up(tmp_path, rows_of(arms, ("a",), 1, success=True), {"arm": arms, "scene": ("a",)})
+        assert shown_flights.three_arms(study) == ("SSP", "TBR", "MCR")
+
+    def test_replans_of_the_table_are_those_of_the_logs(self, flown):  # noqa: F811
+        flights = shown_flights.flights_of(flown)
+        counted = shown_flights.executed(flown.replans, flights)["trial"].value_counts()
+        for row in flights.to_dict("records"):
+            log = replanning.executed(flown.log(row["trial"]))
+            assert counted.get(row["trial"], 0) == len(log) == row["replans"]
+
+
+class TestPaths:
+    def test_figure_3_draws_the_flown_paths_to_scale(self, flown, drawings):  # noqa: F811
+        flights = shown_flights.flights_of(flown)
+        arms, scenes = shown_flights.three_arms(flown), shown_flights.scenes_of(flown, flights)
+        there = shown_flights.stored(flown, flights)
+        shared = next(shown_flights.shared_worlds(flown, there, arms, scenes[:1]))
+        axes = drawings["figure_3"].figure.axes[0]
+        drawn = [line.get_xydata() for line in axes.lines if len(line.get_xydata()) > 100]
+        for log in shared.logs.values():
+            ends = [line for line in drawn if np.allclose(line[0], log.position_m[0, :2])]
+            assert any(np.linalg.norm(line[-1] - log.position_m[-1, :2]) < 0.1 for line in ends)
+        assert axes.get_aspect() == 1.0
+
+    def test_figure_9_has_a_marker_for_every_replan_of_the_scene(self, flown, drawings):  # noqa: F811
+        flights = shown_flights.flights_of(flown)
+        scene = shown_flights.scenes_of(flown, flights)[0]
+        expected = shown_flights.executed(flown.replans, flights[flights["scene"] == scene])
+        causes = {style.cause_mark(cause).colour for cause in expected["cause"]}
+        lines = [line for axes in drawings["figure_9"].figure.axes for line in axes.lines]
+        drawn = sum(
+            len(line.get_xdata())
+            for line in lines
+            if line.get_color() in causes and line.get_marker() not in ("x", "|")
+        )
+        assert drawn == len(expected) > 0
+        longest_s = flights[flights["scene"] == scene]["completion_time_s"][flights["arm"] != "SSP"].max()
+        assert all(axes.get_xlim()[1] >= longest_s for axes in drawings["figure_9"].figure.axes)
+
+    def test_figure_9_has_room_for_causes_of_any_name_and_leaves_first_plans_out(self, tmp_path):
+        table = rows_of(("MCR",), ("a",), 2, success=True, completion_time_s=9.0, min_clearance_m=0.4)
+        table["collision_count"] = 0
+        event = {"effective_s": 3.0, "time_s": 2.9, "status": "ok", "path_change_m": 0.1, "near_change": True}
+        causes = ("first", "retry", "map")
+        replans = [
+            {"trial": trial, "number": number, "cause": cause, **event}
+            for trial in table["trial"]
+            for number, cause in enumerate(causes)
+        ]
+        late = {"trial": "t0", "number": 3, "cause": "goal", **event, "effective_s": 9.5}  # after the end
+        axes = {"arm": ("MCR",), "scene": ("a",)}
+        study = made_up(tmp_path, table, axes, report="table1", replans=pd.DataFrame([*replans, late]))
+        drawing = next(drawing for drawing in drawings_of(study) if drawing.name == "figure_9")
+        (legend,) = drawing.figure.legends
+        words = [text.get_text() for text in legend.get_texts()]
+        assert words == ["map", "retry", "end: success", "end: failure"]
+        assert "2.0 replans a flight" in drawing.figure.axes[0].get_title(loc="left")
+
+
+class TestSafety:
+    def study(self, tmp_path, clearance_m, contacts):
+        n = len(clearance_m)
+        table = rows_of(
+            ("MCR",), ("a",), n, success=True, min_clearance_m=clearance_m, collision_count=contacts
+        )
+        return made_up(tmp_path, table, {"arm": ("MCR",), "scene": ("a",)}, report="table1")
+
+    def drawing(self, study, name):
+        return next(drawing for drawing in drawings_of(study) if drawing.name == name)
+
+    def test_every_flight_is_a_point_at_its_clearance(self, tmp_path):
+        clearance_m = np.random.default_rng(0).gamma(9.0, 0.05, 200)
+        axes = self.drawing(self.study(tmp_path, clearance_m, 0), "figure_7").figure.axes[0]
+        cloud = max((line.get_xydata() for line in axes.lines), key=len)
+        np.testing.assert_allclose(np.sort(cloud[:, 1]), np.sort(clearance_m))
+        assert len(np.unique(cloud.round(9), axis=0)) == 200  # none hides another
+
+    def test_too_many_flights_are_thinned_evenly_and_the_caption_says_so(self, tmp_path):
+        clearance_m = np.random.default_rng(0).gamma(9.0, 0.05, 3000)
+        drawing = self.drawing(self.study(tmp_path, clearance_m, 0), "figure_7")
+        cloud = max((line.get_ydata() for line in drawing.figure.axes[0].lines), key=len)
+        assert len(cloud) == 400
+        assert "400 flights of each arm are drawn" in drawing.caption
+        np.testing.assert_allclose(
+            np.quantile(cloud, [0, 0.5, 1]), np.quantile(clearance_m, [0, 0.5, 1]), rtol=0.01
+        )
+
+    def test_the_shares_of_contacts_are_counted(self, tmp_path):
+        contacts = [0, 0, 0, 1, 1, 2, 5, 9]
+        drawing = self.drawing(self.study(tmp_path, np.full(8, 0.3), contacts), "figure_6")
+        widths = [bar.get_width() for bar in drawing.figure.axes[0].patches]
+        np.testing.assert_allclose(widths, [37.5, 25.0, 12.5, 0.0, 25.0])  # 0, 1, 2, 3, 4 or more
+
+    @pytest.mark.parametrize("values", [[], [0.3], [0.3, 0.3, 0.3], [0.1, 0.2]])
+    def test_a_cloud_of_any_size_stays_in_its_column(self, values):
+        places = safety.crowding(np.array(values))
+        assert places.shape == (len(values),)
+        assert np.all(np.abs(places) <= 1.0)
+
+
+class TestTradeoff:
+    def study(self, tmp_path):
+        axes = {
+            "policy": ("TBR", "MCR"),
+            "setting": ("interval_s=1", "interval_s=2", ""),
+            "scene": ("a", "b"),
+        }
+        parts = []
+        for policy, setting, interval_s, replans in (
+            ("TBR", "interval_s=1", 1.0, 12.0),
+            ("TBR", "interval_s=2", 2.0, 7.0),
+            ("MCR", "", None, 5.0),
+        ):
+            part = rows_of((policy,), ("a", "b"), 4, success=True, min_clearance_m=0.1 * replans)
+            part = part.rename(columns={"arm": "policy"})
+            parts.append(part.assign(setting=setting, p_trigger_interval_s=interval_s, replans=replans))
+        table = pd.concat(parts, ignore_index=True)
+        table["trial"] = [f"t{number}" for number in range(len(table))]
+        return made_up(tmp_path, table, axes, report="tradeoff")
+
+    def test_a_curve_per_policy_joined_along_its_parameter(self, tmp_path):
+        study = self.study(tmp_path)
+        panel = study_panel(study, tradeoff_metrics())
+        curves = tradeoff.curves_of(study, shown_flights.flights_of(study), panel)
+        assert [(curve.name, curve.labels, curve.parameter) for curve in curves] == [
+            ("TBR", ("1", "2"), "interval_s"),
+            ("MCR", ("",), ""),
+        ]
+
+    def test_points_stand_at_the_means(self, tmp_path):
+        drawing = next(iter(drawings_of(self.study(tmp_path))))
+        left, right = drawing.figure.axes
+        by_name = {line.get_label(): line for line in right.lines}
+        np.testing.assert_allclose(by_name["TBR"].get_xydata(), [[12.0, 1.2], [7.0, 0.7]])
+        np.testing.assert_allclose(by_name["MCR"].get_xydata(), [[5.0, 0.5]])
+        assert {tuple(line.get_ydata()) for line in left.lines} == {(100.0, 100.0), (100.0,)}
+        assert "TBR: interval_s" in drawing.caption
+
+    def test_without_settings_presets_that_differ_in_many_parameters_are_not_joined(self, tmp_path):
+        arms = ("MCR", "MCR literal")
+        table = rows_of(arms, ("a", "b"), 2, success=True, min_clearance_m=0.4, replans=3.0)
+        table["trigger"] = "mcr"
+        table["p_trigger_judge"] = np.where(table["arm"] == "MCR", "path", "region")
+        table["p_trigger_since"] = np.where(table["arm"] == "MCR", "plan", "update")
+        study = made_up(tmp_path, table, {"arm": arms, "scene": ("a", "b")}, report="tradeoff")
+        panel = study_panel(study, tradeoff_metrics())
+        curves = tradeoff.curves_of(study, shown_flights.flights_of(study), panel)
+        assert [curve.arms for curve in curves] == [("MCR",), ("MCR literal",)]
+
+
+def tradeoff_metrics():
+    from uavexp.report import shown
+
+    return (shown.RATE, shown.CLEARANCE, shown.REPLANS)
+
+
+def test_policies_show_the_shares_of_causes_and_of_useful_replans(tmp_path):
+    arms = ("MCR", "TBR")
+    table = rows_of(arms, ("a", "b"), 3, success=True, min_clearance_m=0.4)
+    ours = table["arm"] == "MCR"
+    table = table.assign(
+        replans=np.where(ours, 8.0, 10.0),
+        replans_map=np.where(ours, 2.0, 0.0),
+        replans_goal=np.where(ours, 6.0, 0.0),
+        replans_clock=np.where(ours, 0.0, 10.0),
+        useful_replans=np.where(ours, 6.0, 4.0),
+        blocked_delay_s=np.where(ours, 0.1, np.nan),
+    )
+    study = made_up(tmp_path, table, {"arm": arms, "scene": ("a", "b")}, report="policies")
+    drawing = {item.name: item for item in drawings_of(study)}["policies_replans"]
+    often, causes, worth, delay = drawing.figure.axes
+    assert [bar.get_width() for bar in causes.patches] == pytest.approx([25, 0, 75, 0, 0, 100])
+    assert [bar.get_width() for bar in worth.patches] == pytest.approx([75, 40, 25, 60])
+    assert {float(line.get_xdata()[0]) for line in often.lines if line.get_marker() == "o"} == {8.0, 10.0}
+    assert [float(line.get_xdata()[0]) for line in delay.lines if line.get_marker() == "o"] == pytest.approx(
+        [0.1]
+    )
+
+
+def test_robustness_draws_every_level_at_its_mean(tmp_path):
+    parts = []
+    for noise, success in (("none", True), ("strong", False)):
+        for latency in ("0 ms", "30 ms"):
+            part = rows_of(("MCR",), ("a", "b"), 2, success=success, min_clearance_m=0.4, replans=1.0)
+            parts.append(part.assign(noise=noise, latency=latency, completion_time_s=30.0))
+    table = pd.concat(parts, ignore_index=True)
+    table["trial"] = [f"t{number}" for number in range(len(table))]
+    event = {"time_s": 1.0, "effective_s": 1.03, "cause": "map", "status": "ok", "path_change_m": 0.05}
+    fired = table[table["noise"] == "strong"]["trial"]
+    replans = pd.DataFrame(
+        [
+            {"trial": trial, "number": number, "near_change": True, **event}
+            for trial in fired
+            for number in (0, 1)
+        ]
+    )
+    axes = {"arm": ("MCR",), "noise": ("none", "strong"), "latency": ("0 ms", "30 ms"), "scene": ("a", "b")}
+    study = made_up(tmp_path, table, axes, report="robustness", replans=replans)
+    (drawing,) = drawings_of(study)
+    success, clearance, false = drawing.figure.axes
+    for panel, expected in ((success, [100.0, 0.0]), (clearance, [0.4, 0.4]), (false, [0.0, 2.0])):
+        drawn = [line for line in panel.lines if line.get_label() in axes["latency"]]
+        assert len(drawn) == 2
+        for line in drawn:
+            np.testing.assert_allclose(line.get_ydata(), expected)
+    assert robustness.METRICS[2].label == false.get_ylabel().replace("\n", " ")
+
+
+def test_a_summary_has_a_row_per_arm(tmp_path):
+    arms = tuple(f"arm {number}" for number in range(9))
+    study = made_up(tmp_path, rows_of(arms, ("a",), 4, success=True), {"arm": arms, "scene": ("a",)})
+    (drawing,) = drawings_of(study)
+    assert drawing.name == "success"
+    assert len(drawing.figure.axes[0].get_yticklabels()) == 9
+
+
+@pytest.mark.parametrize(
+    ("numbers", "words"), [([3], "3"), ([0, 1, 2, 3], "0 to 3"), ([0, 2, 5], "0, 2, 5"), ([4, 5], "4, 5")]
+)
+def test_seeds_in_words(numbers, words):
+    assert canvas.span(numbers) == words

@@ -1,0 +1,255 @@
+"""Configuration to components, checked against their annotations and protocols.
+
+A configuration is plain data here: one dict per group with `_target_` and parameters, and
+the numbers that belong to no group. Nothing but a class defined in a trusted package is
+ever looked up (`uavexp.config.trust` has refused the rest before), and only its constructor
+is called.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import inspect
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any, get_args, get_origin
+
+from uavexp.config.trust import check_trust, is_trusted
+from uavexp.errors import ConfigError, UavexpError
+from uavexp.parameters import check_value, nearest, parameter_types, plain, required_parameters
+
+if TYPE_CHECKING:
+    from uavexp.trial import Parts
+
+GROUPS = (
+    "world",
+    "sensor",
+    "estimator",
+    "mapping",
+    "explorer",
+    "trigger",
+    "planner",
+    "controller",
+    "vehicle",
+    "safety",
+    "movers",
+    "detection",
+    "mission",
+)
+TOP_LEVEL: dict[str, Any] = {
+    "world_seed": int | None,
+    "step_s": float,
+    "latency_s": float,
+    "start_bubble_m": float,
+    "settle_s": float,
+    "restart_error_m": float,
+    "stuck_s": float,
+    "goals_per_request": int,
+    "look_around_radps": float,
+    "turn_first_rad": float,
+    "yaw_lookahead_s": float,
+}
+TARGET = "_target_"
+
+
+def check_config(config: Mapping[str, Any], options: Mapping[str, str]) -> dict[str, Any]:
+    """Return the configuration in its components' own types, as plain data.
+
+    Equal configurations come out equal whatever was typed (5 or 5.0), so that they name
+    the same trial.
+
+    Args:
+        config: one tree per group and the top-level numbers.
+        options: chosen option per group, for messages.
+
+    Raises:
+        ConfigError: a wrong class, an unknown or missing parameter, a wrong type; every
+            constructor has accepted its values when this returns.
+    """
+    checked: dict[str, Any] = {key: check_value(key, config[key], kind) for key, kind in TOP_LEVEL.items()}
+    for group in GROUPS:
+        tree = config[group]
+        if not isinstance(tree, Mapping) or TARGET not in tree:
+            raise ConfigError(f"{group}={options[group]}: the option has no {TARGET}")
+        checked[group] = _checked_tree(group, tree, group)
+    build(checked)
+    return checked
+
+
+def build(config: Mapping[str, Any]) -> Parts:
+    """Build every component of a checked configuration, fresh.
+
+    Raises:
+        ConfigError: a constructor or a protocol refuses.
+    """
+    from uavexp.trial import Parts
+
+    check_trust(config)
+    components = {group: build_component(group, config[group]) for group in GROUPS}
+    try:
+        parts = Parts(**components, **{key: config[key] for key in TOP_LEVEL})
+    except ArithmeticError as error:
+        raise ConfigError(f"a rate or period does not fit the step: {error}") from error
+    _check_monitored_distance(parts)
+    _check_endings(parts)
+    return parts
+
+
+def build_component(group: str, tree: Mapping[str, Any], path: str = "") -> Any:
+    """Build one component, those inside it first, and check that it speaks its group's protocol.
+
+    Args:
+        group: whose protocol it must speak.
+        tree: `_target_` and parameters; a parameter of type dict[str, P], P a group's protocol, holds
+            named trees of that group.
+        path: where the tree stands, for messages; the group when it is not told.
+    """
+    path = path or group
+    cls = component_class(group, tree[TARGET])
+    arguments = _arguments(group, tree, path)
+    for key, inner in nested_groups(cls).items():
+        parts = arguments.get(key, {}).items()
+        arguments[key] = {name: build_component(inner, part, f"{path}.{key}.{name}") for name, part in parts}
+    try:
+        component = cls(**arguments)
+    except UavexpError as error:
+        about_parameter = str(error).split(" ")[0] in parameter_types(cls)
+        raise ConfigError(f"{path}{'.' if about_parameter else ': '}{error}") from error
+    except (TypeError, ValueError, ArithmeticError) as error:
+        raise ConfigError(f"{path}: {cls.__name__} cannot be made: {error}") from error
+    lacking = [name for name in protocol_members(group) if not _has(component, name)]
+    if lacking:
+        raise ConfigError(
+            f"{path}: {cls.__module__}.{cls.__name__} is no {group}, it lacks {', '.join(lacking)}"
+        )
+    return component
+
+
+@functools.cache
+def nested_groups(cls: type) -> dict[str, str]:
+    """Parameters that hold named components (annotated dict[str, P]), and the group whose protocol P is."""
+    found = {}
+    for name, annotation in parameter_types(cls).items():
+        key_and_value = get_args(annotation) if get_origin(annotation) is dict else (None, None)
+        group = next((group for group in GROUPS if key_and_value[1] is protocol_of(group)), None)
+        if key_and_value[0] is str and group is not None:
+            found[name] = group
+    return found
+
+
+def _has(component: object, name: str) -> bool:
+    """Whether an attribute exists; properties are not called, they may need `reset` first."""
+    try:
+        inspect.getattr_static(component, name)
+    except AttributeError:
+        return False
+    return True
+
+
+def component_class(group: str, target: str, path: str = "") -> type:
+    """Class that a `_target_` names: defined in a trusted package, a built-in one in its group's."""
+    path = path or group
+    module_name, _, name = target.rpartition(".")
+    if target.startswith("uavexp.") and not module_name.startswith(f"uavexp.{group}."):
+        raise ConfigError(f"{path}.{TARGET}={target} is no option of {group}")
+    try:
+        module = importlib.import_module(module_name)
+    except ModuleNotFoundError as error:
+        raise ConfigError(f"{path}.{TARGET}={target}: {error}") from error
+    cls = getattr(module, name, None)
+    # a class reached through a trusted module but made elsewhere (pathlib.Path) is a stranger's
+    if not isinstance(cls, type) or not is_trusted(f"{cls.__module__}.{name}"):
+        raise ConfigError(f"{path}.{TARGET}={target}: {module_name} defines no class {name}")
+    return cls
+
+
+def protocol_members(group: str) -> list[str]:
+    """Names of the methods and attributes that a group's protocol asks for."""
+    protocol = protocol_of(group)
+    own = [name for name in vars(protocol) if not name.startswith("_")]
+    return sorted({*own, *vars(protocol).get("__annotations__", {})})
+
+
+def protocol_of(group: str) -> type:
+    """The one protocol that `uavexp/<group>/base.py` defines."""
+    base = importlib.import_module(f"uavexp.{group}.base")
+    protocols = [
+        item
+        for item in vars(base).values()
+        if isinstance(item, type)
+        and item.__module__ == base.__name__
+        and getattr(item, "_is_protocol", False)
+    ]
+    if len(protocols) != 1:
+        raise TypeError(f"uavexp/{group}/base.py must define one protocol, it has {len(protocols)}")
+    return protocols[0]
+
+
+def _checked_tree(group: str, tree: Any, path: str) -> dict[str, Any]:
+    """A component's tree as plain data in its parameters' own types."""
+    return {TARGET: tree[TARGET], **plain(_arguments(group, tree, path))}
+
+
+def _arguments(group: str, tree: Mapping[str, Any], path: str) -> dict[str, Any]:
+    """Constructor arguments in their annotated types; components inside are still trees."""
+    cls = component_class(group, tree[TARGET], path)
+    allowed = parameter_types(cls)
+    given = {key: value for key, value in tree.items() if key != TARGET}
+    for key in given:
+        if key not in allowed:
+            raise ConfigError(
+                f"{path}.{key}: {cls.__name__} has no parameter '{key}'{nearest(key, allowed)}; "
+                f"it has {', '.join(allowed) or 'none'}"
+            )
+    for key in required_parameters(cls):
+        if key not in given:
+            raise ConfigError(f"{path}.{key} must be given: type {path}.{key}=VALUE")
+    nested = nested_groups(cls)
+    return {
+        key: _named_trees(nested[key], value, f"{path}.{key}")
+        if key in nested
+        else check_value(f"{path}.{key}", value, allowed[key])
+        for key, value in given.items()
+    }
+
+
+def _named_trees(group: str, trees: Any, path: str) -> dict[str, Any]:
+    """Checked trees of the components of a group that stand inside another one."""
+    if not isinstance(trees, Mapping):
+        raise ConfigError(f"{path} must be named components of {group}, got {trees!r}")
+    for name, tree in trees.items():
+        if not isinstance(tree, Mapping) or TARGET not in tree:
+            raise ConfigError(f"{path}.{name} must be a component of {group} with {TARGET}, got {tree!r}")
+    return {str(name): _checked_tree(group, tree, f"{path}.{name}") for name, tree in trees.items()}
+
+
+def _check_monitored_distance(parts: Parts) -> None:
+    """A field truncated below the trigger's radius hides changes inside it (paper 1)."""
+    reach_m = getattr(parts.mapping, "max_distance_m", None)
+    for path, policy in _policies(parts):
+        radius_m = getattr(policy, "monitor_radius_m", None)
+        if radius_m is not None and reach_m is not None and reach_m < radius_m:
+            raise ConfigError(
+                f"mapping.max_distance_m must be >= {path}.monitor_radius_m = {radius_m}, got {reach_m}"
+            )
+
+
+def _policies(parts: Parts) -> Iterator[tuple[str, Any]]:
+    """The trigger and the policies inside it, each with the path of its parameters."""
+    yield "trigger", parts.trigger
+    for name, policy in getattr(parts.trigger, "policies", {}).items():
+        yield f"trigger.policies.{name}", policy
+
+
+def _check_endings(parts: Parts) -> None:
+    """Combinations that could only end without having begun."""
+    for path, policy in _policies(parts):
+        interval_s = getattr(policy, "interval_s", 0.0)
+        if interval_s >= parts.stuck_s:
+            raise ConfigError(f"stuck_s must be > {path}.interval_s = {interval_s}, got {parts.stuck_s}")
+    patience_s = getattr(parts.mission, "patience_s", 0.0)
+    if 2.0 * patience_s >= parts.stuck_s:  # a stop is put off once before it is given up
+        raise ConfigError(f"stuck_s must be > 2 mission.patience_s = {2.0 * patience_s}, got {parts.stuck_s}")
+    names = type(parts.mission).__name__, type(parts.explorer).__name__
+    if names == ("Explore", "TargetOnly"):
+        raise ConfigError("mission=explore has no target: it needs explorer=frontier, got target_only")

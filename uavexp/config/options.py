@@ -1,0 +1,73 @@
+"""Which config groups, options and parameters exist, read from the yaml files as text."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from uavexp.errors import ConfigError
+
+PRESET_GROUP = "strategy"  # only overrides other groups; has no component
+EXPERIMENT_GROUP = "experiments"  # files of their own, see `uavexp.config.experiment`
+RUNNER_GROUP = "runner"  # how trials are run: no part of a trial
+_PARAMETER = re.compile(r"^(?P<name>[A-Za-z_]\w*):\s*(?P<value>.*?)\s*(?:\s#\s*(?P<comment>.*))?$")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Parameter:
+    """One line of an option's yaml."""
+
+    name: str
+    default: str
+    comment: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Option:
+    """One yaml file, taken apart as text (never executed, never resolved)."""
+
+    description: str
+    parameters: tuple[Parameter, ...]
+
+
+def user_folder(path: str) -> Path:
+    """Absolute folder given by `--config-dir`, checked to exist."""
+    folder = Path(path).expanduser().resolve()
+    if not folder.is_dir():
+        raise ConfigError(f"--config-dir {path}: no such folder")
+    return folder
+
+
+def list_options(folders: Sequence[Path]) -> dict[str, dict[str, Path]]:
+    """Yaml file of every option of every group.
+
+    Raises:
+        ConfigError: a user's folder has an option whose name is taken (the shipped one
+            would win silently).
+    """
+    found: dict[str, dict[str, Path]] = {}
+    for folder in folders:
+        for file in sorted(folder.glob("*/*.yaml")):
+            options = found.setdefault(file.parent.name, {})
+            if file.stem in options:
+                raise ConfigError(f"{file}: {file.parent.name}={file.stem} exists already; rename yours")
+            options[file.stem] = file
+    return found
+
+
+def read_option(file: Path) -> Option:
+    """Description (leading comment) and parameters of one yaml file."""
+    description: list[str] = []
+    parameters: list[Parameter] = []
+    for line in file.read_text(encoding="utf-8").splitlines():
+        match = _PARAMETER.match(line)
+        if match is None:
+            if line.startswith("#") and not parameters and not line.startswith("# @package"):
+                description.append(line.lstrip("# ").rstrip())
+        elif match["name"] not in ("_target_", "defaults"):
+            parameters.append(
+                Parameter(name=match["name"], default=match["value"], comment=match["comment"] or "")
+            )
+    return Option(description=" ".join(description), parameters=tuple(parameters))

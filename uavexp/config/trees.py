@@ -1,0 +1,107 @@
+"""Trees of options as Hydra composes them: the only module that composes with it, once per combination."""
+
+from __future__ import annotations
+
+import copy
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from uavexp.config.interpolation import with_cause
+from uavexp.config.options import PRESET_GROUP
+from uavexp.config.overrides import quoted
+from uavexp.errors import ConfigError
+from uavexp.paths import conf_folder
+
+TRIGGER_GROUP = "trigger"  # what presets choose
+CONFIG_NAME = "config"
+_OF_ONE_COMPOSITION = ("runtime", "overrides", "job")  # parts of `hydra` that only tell what was typed
+
+
+@dataclass(slots=True, kw_only=True)
+class Trees:
+    """Composed trees of options, kept."""
+
+    user_folder: Path | None = None
+    many: bool = False  # of a large grid: join trees of single options where that is the same
+    _cache: dict[tuple[tuple[str, str], ...], dict[str, Any]] = field(default_factory=dict, repr=False)
+
+    def of(self, chosen: Mapping[str, str]) -> dict[str, Any]:
+        """The tree of these options (group -> option), unresolved; not to be changed."""
+        key = tuple(sorted(chosen.items()))
+        if key not in self._cache:
+            joined = self._join(chosen) if self.many and len(chosen) > 1 else None
+            self._cache[key] = joined or self._compose(chosen)
+        return self._cache[key]
+
+    def _join(self, chosen: Mapping[str, str]) -> dict[str, Any] | None:
+        """The tree of several options from trees of one each: a grid needs their sum, not their product.
+
+        None where an option touches more than its own group, or the preset touches that group.
+        """
+        preset = {group: option for group, option in chosen.items() if group in (PRESET_GROUP, TRIGGER_GROUP)}
+        if preset == chosen:
+            return None
+        plain = self.of({})
+        tree = copy.deepcopy(self.of(preset))
+        for group, option in chosen.items():
+            if group in preset:
+                continue
+            alone = self.of({group: option})
+            if _without(alone, group) != _without(plain, group) or tree[group] != plain[group]:
+                return None
+            tree[group] = copy.deepcopy(alone[group])
+            tree["hydra"]["runtime"]["choices"][group] = option
+        return tree
+
+    def _compose(self, chosen: Mapping[str, str]) -> dict[str, Any]:
+        arguments = [f"{group}={name}" for group, name in chosen.items()]
+        if TRIGGER_GROUP in chosen and PRESET_GROUP not in chosen:
+            arguments.append(f"~{PRESET_GROUP}")  # the default preset's name would be wrong
+        tree = self._tree(arguments)
+        if TRIGGER_GROUP in chosen and PRESET_GROUP in chosen:
+            preset = self._tree([f"{PRESET_GROUP}={chosen[PRESET_GROUP]}"])
+            wanted = preset["hydra"]["runtime"]["choices"][TRIGGER_GROUP]
+            if wanted != chosen[TRIGGER_GROUP]:
+                raise ConfigError(
+                    f"{PRESET_GROUP}={chosen[PRESET_GROUP]} means {TRIGGER_GROUP}={wanted}, "
+                    f"{TRIGGER_GROUP}={chosen[TRIGGER_GROUP]} contradicts it: give one of the two"
+                )
+        return tree
+
+    def _tree(self, arguments: list[str]) -> dict[str, Any]:
+        import yaml  # type: ignore[import-untyped]
+        from hydra import compose, initialize_config_dir
+        from hydra.core.global_hydra import GlobalHydra
+        from hydra.errors import HydraException
+        from omegaconf import OmegaConf
+        from omegaconf.errors import OmegaConfBaseException
+
+        bad_input = (HydraException, OmegaConfBaseException, yaml.YAMLError, OSError, ValueError, KeyError)
+
+        if self.user_folder is not None:
+            arguments = [*arguments, f"hydra.searchpath=[{_file_url(self.user_folder)}]"]
+        GlobalHydra.instance().clear()
+        try:
+            with (
+                warnings.catch_warnings(),
+                initialize_config_dir(config_dir=str(conf_folder()), version_base="1.3", job_name="uavexp"),
+            ):
+                warnings.simplefilter("ignore")
+                composed = compose(CONFIG_NAME, overrides=arguments, return_hydra_config=True)
+            tree: Any = OmegaConf.to_container(composed, resolve=False)
+        except bad_input as error:
+            raise ConfigError(f"the configuration does not compose: {with_cause(error)}") from error
+        return dict(tree)
+
+
+def _without(tree: Mapping[str, Any], group: str) -> dict[str, Any]:
+    """A composed tree without one group, and without what `hydra` tells of the composition itself."""
+    hydra = {key: value for key, value in tree["hydra"].items() if key not in _OF_ONE_COMPOSITION}
+    return {**{key: value for key, value in tree.items() if key != group}, "hydra": hydra}
+
+
+def _file_url(folder: Path) -> str:
+    return quoted(f"file://{folder}")

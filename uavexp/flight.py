@@ -1,0 +1,89 @@
+"""One trial flown: cell and seed in, world, log and metrics out. Nothing here writes a file."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from uavexp.config.build import build
+from uavexp.config.composition import Cell, Composer
+from uavexp.config.overrides import flatten, parse_settings, render
+from uavexp.errors import ConfigError
+from uavexp.types import TrialLog, World
+
+if TYPE_CHECKING:
+    from uavexp.trial import Progress
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trial:
+    """One flown trial: one cell, one seed."""
+
+    cell: Cell
+    seed: int
+    world: World
+    log: TrialLog
+    metrics: dict[str, Any]
+
+    @property
+    def config(self) -> dict[str, Any]:
+        """The resolved configuration, plain data."""
+        return self.cell.config
+
+    @property
+    def command(self) -> str:
+        """The command line that repeats this trial."""
+        return repeat_command(self.cell, self.seed)
+
+
+def fly_cell(cell: Cell, seed: int, progress: Progress | None = None) -> Trial:
+    """Build fresh components and fly one trial.
+
+    Raises:
+        UavexpError: something the user can mend (the world cannot be made, no such device).
+    """
+    from uavexp.metrics import evaluate
+    from uavexp.trial import fly_trial
+
+    world, log = fly_trial(build(cell.config), seed, progress)
+    return Trial(cell=cell, seed=seed, world=world, log=log, metrics=evaluate(log, world))
+
+
+def check_world(cell: Cell, seed: int) -> None:
+    """Make a cell's world once, so that a bad one is told before anything has flown.
+
+    Raises:
+        WorldError: the world cannot be made or read.
+    """
+    from uavexp.seeding import Stream, generator
+
+    parts = build(cell.config)
+    layout = seed if parts.world_seed is None else parts.world_seed
+    parts.world.generate(generator(layout, Stream.WORLD))
+
+
+def repeat_command(cell: Cell, seed: int, user_folder: Path | None = None) -> str:
+    """The command line that repeats one trial, quoted for a shell."""
+    typed = [f"{'+' * setting.add}{setting.key}={render(setting.values[0])}" for setting in cell.settings]
+    folder = ["--config-dir", str(user_folder)] if user_folder else []
+    return shlex.join(["python", "-m", "uavexp", *folder, *typed, f"seed={seed}"])
+
+
+def fly_overrides(overrides: Sequence[str], values: Mapping[str, Any]) -> Trial:
+    """Compose one cell from overrides and keywords and fly it with one seed (`uavexp.fly`)."""
+    settings = [
+        *parse_settings(overrides),
+        *(setting for key, value in values.items() for setting in flatten(key, value)),
+    ]
+    command = Composer().command(settings)
+    if len(command.cells) != 1 or len(command.seeds) != 1:
+        raise ConfigError(
+            f"uavexp.fly flies one trial, not {len(command.cells)} cells and {len(command.seeds)} seeds; "
+            "grids are flown from the command line"
+        )
+    if command.out is not None:
+        raise ConfigError("uavexp.fly writes nothing: out has no place here")
+    return fly_cell(command.cells[0], command.seeds[0])

@@ -1,0 +1,94 @@
+"""No smoothing: the straight ways of a path, each flown from rest to rest.
+
+On a way of length d the distance is d (10 s³ - 15 s⁴ + 6 s⁵), s = t / T: velocity and acceleration are
+zero at both ends, so both are continuous at every corner, and the path is not left by a hair. T is
+the least that keeps all three peaks, in closed form: speed 15/8 d/T, acceleration 10/√3 d/T², jerk
+60 d/T³ (the jerk being what turning the thrust vector at the vehicle's body-rate limit gives, `brake`).
+
+A vehicle that moves brakes in a straight line first, and goes on from where it stands: straight to the
+path where that is free, else back the way it came.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from uavexp.arrays import Float
+from uavexp.braking import braking_trajectory, jerk_mps3
+from uavexp.planner.clearance import shortfall
+from uavexp.planner.find.free_space import free_space
+from uavexp.planner.shape.base import SmoothResult
+from uavexp.planner.shape.shortcut import shortcut
+from uavexp.trajectory import Trajectory, evaluate, join, sample_times
+from uavexp.types import Limits, PlanRequest, PlanStatus
+
+_CHECK_S = 0.02
+_SHORTEST_M = 1e-6  # a shorter way is none
+_SHORTEST_S = 0.1  # of a trajectory to where the vehicle already is
+_POWERS = np.array([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TimeLaw:
+    """Smoother `none`; see the module. Times that came with a path are not used."""
+
+    def smooth(
+        self,
+        request: PlanRequest,
+        path_m: Float,
+        times_s: Float | None,
+        limits: Limits,
+        min_clearance_m: float,
+        known_only: bool,
+    ) -> SmoothResult:
+        """Return a trajectory that stops at every corner (`Smoother.smooth`)."""
+        del times_s
+        if not (limits.max_speed_mps > 0.0 and limits.max_acceleration_mps2 > 0.0):
+            reason = f"limits of {limits.max_speed_mps:g} m/s and {limits.max_acceleration_mps2:g} m/s²"
+            return SmoothResult(status=PlanStatus.LIMITS, reason=reason)
+        if not np.any(request.velocity_mps) and not np.any(request.acceleration_mps2):
+            return SmoothResult(status=PlanStatus.OK, trajectory=stop_and_go(path_m, request.time_s, limits))
+        state = (request.position_m, request.velocity_mps, request.acceleration_mps2)
+        brake = braking_trajectory(request.time_s, *state, limits)
+        way = evaluate(brake, sample_times(brake, brake.start_s, _CHECK_S))[0]
+        blocked = shortfall(request, way, min_clearance_m, limits.max_acceleration_mps2, known_only)
+        if blocked:
+            return SmoothResult(status=PlanStatus.NOT_CLEAR, reason=f"braking: {blocked}")
+        ends = np.stack([way[-1], request.goal.position_m])
+        space = free_space(
+            request.field, ends, request.flight_bounds_m, min_clearance_m, math.inf, known_only
+        )
+        path = shortcut(np.concatenate([way[::-1], path_m[1:]]), space)
+        onward = stop_and_go(path, brake.end_s, limits)
+        return SmoothResult(status=PlanStatus.OK, trajectory=join(brake, onward), reason="brakes first")
+
+
+def stop_and_go(path_m: Float, start_s: float, limits: Limits) -> Trajectory:
+    """Trajectory along a polyline (P, 3) that rests at its every point, as fast as the limits allow.
+
+    Args:
+        path_m: (P, 3).
+        start_s: absolute time at its first point.
+        limits: of the vehicle.
+    """
+    steps = np.diff(path_m, axis=0)
+    lengths = np.linalg.norm(steps, axis=1)
+    kept = lengths > _SHORTEST_M
+    if not kept.any():
+        kept[0], steps[0] = True, path_m[-1] - path_m[0]
+    durations = np.maximum(_durations(lengths[kept], limits), _SHORTEST_S if kept.sum() == 1 else 0.0)
+    coefficients = _POWERS[:, None] / durations[:, None, None] ** np.arange(6)[:, None] * steps[kept][:, None]
+    coefficients[:, 0] = path_m[:-1][kept]
+    breaks = start_s + np.concatenate([[0.0], np.cumsum(durations)])
+    return Trajectory(breaks_s=breaks, coefficients=coefficients, at_rest=True)
+
+
+def _durations(lengths_m: Float, limits: Limits) -> Float:
+    """Least duration (K,) of each way, s."""
+    by_speed = 15.0 / 8.0 * lengths_m / limits.max_speed_mps
+    by_acceleration = np.sqrt(10.0 / math.sqrt(3.0) * lengths_m / limits.max_acceleration_mps2)
+    by_jerk = np.cbrt(60.0 * lengths_m / jerk_mps3(limits))
+    return np.asarray(np.maximum(by_speed, np.maximum(by_acceleration, by_jerk)))

@@ -1,0 +1,143 @@
+"""The log of a flight as `log.npz` and back, so that metrics can be recomputed without flying."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import io
+import zipfile
+import zlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from uavexp.errors import RecordError
+from uavexp.store.records import write_bytes
+from uavexp.types import Contact, Outcome, PlanStatus, Replan, TrialLog
+
+Arrays = dict[str, npt.NDArray[Any]]
+
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # a zip entry must carry a time; this one never changes
+_RAGGED = ("changed_m", "trajectory_m")  # (n, 3) per replan, n differing
+
+
+def log_arrays(log: TrialLog) -> Arrays:
+    """Every field of a log as arrays, clock times apart (they are no part of the record)."""
+    arrays: Arrays = {}
+    for item in dataclasses.fields(TrialLog):
+        value = getattr(log, item.name)
+        if item.name == "wall_s":
+            continue
+        if item.name == "replans":
+            arrays |= _event_arrays("replans", Replan, value)
+        elif item.name == "contacts":
+            arrays |= _event_arrays("contacts", Contact, value)
+        else:
+            arrays[item.name] = np.asarray(str(value) if isinstance(value, str) else value)
+    return arrays
+
+
+def arrays_digest(arrays: Mapping[str, npt.NDArray[Any]]) -> str:
+    """sha256 over names, types, shapes and values; independent of how a zip packs them."""
+    total = hashlib.sha256()
+    for name in sorted(arrays):
+        array = np.asarray(arrays[name], order="C")
+        total.update(f"{name}\0{array.dtype.str}\0{array.shape}\0".encode())
+        total.update(array.tobytes())
+    return total.hexdigest()
+
+
+def pack(arrays: Mapping[str, npt.NDArray[Any]]) -> bytes:
+    """Arrays as a compressed npz whose bytes depend on nothing but the arrays."""
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED, compresslevel=4) as archive:
+        for name in sorted(arrays):
+            entry = zipfile.ZipInfo(f"{name}.npy", _EPOCH)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            buffer = io.BytesIO()
+            np.lib.format.write_array(buffer, np.asarray(arrays[name], order="C"), allow_pickle=False)
+            archive.writestr(entry, buffer.getvalue())
+    return packed.getvalue()
+
+
+def unpack(path: Path) -> Arrays:
+    """Arrays of an npz file.
+
+    Raises:
+        RecordError: missing or damaged.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            return {name: archive[name] for name in archive.files}
+    except (ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        raise RecordError(f"{path}: damaged ({error})") from error
+    except OSError as error:
+        raise RecordError(f"{path}: cannot be read ({error})") from error
+
+
+def write_log(path: Path, arrays: Mapping[str, npt.NDArray[Any]]) -> None:
+    """Write the arrays of a log atomically; equal logs give equal bytes."""
+    write_bytes(path, pack(arrays))
+
+
+def read_log(path: Path) -> TrialLog:
+    """Read a log back; its clock times stay empty.
+
+    Raises:
+        RecordError: missing, damaged, or not a log.
+    """
+    arrays = unpack(path)
+    try:
+        return _log_of(arrays)
+    except (ValueError, KeyError, IndexError, TypeError) as error:
+        raise RecordError(f"{path}: no log ({error})") from error
+
+
+def _log_of(arrays: Arrays) -> TrialLog:
+    values: dict[str, Any] = {}
+    for item in dataclasses.fields(TrialLog):
+        if item.name in arrays:
+            array = arrays[item.name]
+            values[item.name] = array.item() if array.ndim == 0 else array
+    values["outcome"] = Outcome(values["outcome"])
+    values["replans"] = tuple(
+        Replan(**{**row, "status": PlanStatus(row["status"])}) for row in _events("replans", Replan, arrays)
+    )
+    values["contacts"] = tuple(Contact(**row) for row in _events("contacts", Contact, arrays))
+    return TrialLog(**values)
+
+
+def _event_arrays(prefix: str, kind: type, events: Sequence[Any]) -> Arrays:
+    """One array per field of a sequence of events; ragged fields end to end, with counts."""
+    arrays: Arrays = {}
+    for name in _names(kind):
+        rows = [getattr(event, name) for event in events]
+        key = f"{prefix}.{name}"
+        if name in _RAGGED:
+            arrays[f"{key}.count"] = np.array([len(row) for row in rows], dtype=np.int64)
+            arrays[key] = np.concatenate([np.zeros((0, 3), dtype=np.float32), *rows])
+        elif rows and isinstance(rows[0], str):
+            arrays[key] = np.array([str(row) for row in rows])
+        else:
+            arrays[key] = np.array(rows)
+    return arrays
+
+
+def _events(prefix: str, kind: type, arrays: Arrays) -> list[dict[str, Any]]:
+    names = [name for name in _names(kind) if f"{prefix}.{name}" in arrays]  # older logs have fewer
+    columns: dict[str, list[Any]] = {}
+    for name in names:
+        array = arrays[f"{prefix}.{name}"]
+        if name in _RAGGED:
+            columns[name] = np.split(array, np.cumsum(arrays[f"{prefix}.{name}.count"])[:-1])
+        else:
+            columns[name] = list(array) if array.ndim > 1 else array.tolist()
+    count = len(arrays[f"{prefix}.{names[0]}"])
+    return [{name: column[index] for name, column in columns.items()} for index in range(count)]
+
+
+def _names(kind: type) -> list[str]:
+    return [item.name for item in dataclasses.fields(kind)]

@@ -1,0 +1,42 @@
+"""Imported once by the fork server: all that a flight imports, with its compiled kernels loaded."""
+
+from __future__ import annotations
+
+import gc
+import importlib
+import io
+import pkgutil
+
+from uavexp.config.build import GROUPS
+from uavexp.sweep import kernels
+
+_ALSO = ("uavexp.trial", "uavexp.metrics", "uavexp.report.picture", "uavexp.sweep.task")
+
+
+def _import_everything() -> None:
+    """Import every option of every role, and what surrounds them."""
+    for group in GROUPS:
+        package = importlib.import_module(f"uavexp.{group}")
+        for module in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
+            importlib.import_module(module.name)
+    for name in _ALSO:
+        importlib.import_module(name)
+
+
+def _draw_something() -> None:
+    """Let matplotlib load its fonts."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    from uavexp.report import page, style
+
+    with style.house_style():
+        sheet = page.lay_out((20.0, 10.0))
+        FigureCanvasAgg(sheet.figure)
+        sheet.plan.set_title("uavexp")
+        sheet.figure.savefig(io.BytesIO(), format="png")
+
+
+_import_everything()
+_draw_something()
+kernels.load()
+gc.freeze()  # or the first collection in a child copies every page it was given

@@ -1,0 +1,197 @@
+"""Flies the trials of a command that are not there yet and leaves a study folder."""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from uavexp.cli.terminal import Terminal
+from uavexp.config.composition import Command
+from uavexp.errors import ConfigError, RecordError, UavexpError, one_line
+from uavexp.flight import check_world, fly_cell
+from uavexp.store.folders import folder_of, opened
+from uavexp.store.history import FLYING, Run
+from uavexp.store.records import write_text
+from uavexp.store.study import STUDY, collect, study_text
+from uavexp.store.writing import put_trial, put_world, remove_unfinished, set_aside
+from uavexp.sweep import kernels
+from uavexp.sweep.dask import run_dask
+from uavexp.sweep.faults import reason_of
+from uavexp.sweep.head_start import PRELOAD
+from uavexp.sweep.job import Done, Job, Status
+from uavexp.sweep.local import Watch, run_local, start_fork_server
+from uavexp.sweep.plan import Plan, plan_of
+from uavexp.sweep.runner import Backend, Runner, read_runner
+from uavexp.sweep.task import Task, files_of, fly_task, fly_task_elsewhere, version
+
+_WARM_UP_S = 3.0  # simulated: by then every kernel of a flight has been called
+
+
+def execute(
+    command: Command, terminal: Terminal, user_folder: Path | None = None, typed: Sequence[str] = ()
+) -> int:
+    """Fly a command's trials and leave their folder.
+
+    Args:
+        command: what to fly.
+        terminal: who is told.
+        user_folder: of `--config-dir`.
+        typed: the command line, for the folder's own record of it.
+
+    Returns:
+        Exit code: 0, or 1 when some trial did not run to its end.
+
+    Raises:
+        UavexpError: bad input, told before anything was written; or a full disk.
+    """
+    runner = read_runner(command.runner)
+    look = partial(plan_of, command, user_folder=user_folder, accept_other_code=runner.accept_other_code)
+    if runner.dry_run:
+        folder = folder_of(command)
+        terminal.listing(look(folder), folder)
+        return 0
+    with opened(command) as folder:
+        plan = look(folder)
+        if plan.left:
+            _prepare(plan, runner, terminal)
+        return _fly_plan(plan, command, terminal, Run(typed=typed, runner=runner))
+
+
+def _prepare(plan: Plan, runner: Runner, terminal: Terminal) -> None:
+    """Have kernels compiled and the fork server started."""
+    if not kernels.is_compiled():
+        terminal.say("first run: compiling kernels takes about a minute")
+        _compile_kernels(plan.left[0])
+    if runner.backend == Backend.LOCAL:
+        start_fork_server([PRELOAD])
+
+
+def _fly_plan(plan: Plan, command: Command, terminal: Terminal, run: Run) -> int:
+    folder, kept, failed = plan.study.folder, 0, 0
+    with (
+        terminal.progress(plan),
+        _worlds_checked(plan) as wait_for_worlds,
+        contextlib.closing(_fly(plan, run.runner, terminal.watch)) as flying,
+    ):
+        try:
+            for done in flying:
+                if not kept:
+                    wait_for_worlds()
+                    _refuse_bad_input(plan, done)
+                    _begin(plan, run)
+                _keep(folder, done)
+                kept += 1
+                failed += done.answer.status is not Status.OK
+                terminal.finished(done)
+        except (KeyboardInterrupt, UavexpError) as error:
+            with contextlib.suppress(RecordError):
+                if (folder / STUDY).exists():
+                    run.note(folder, _ending(error, folder), kept, failed)
+                    collect(folder)
+            terminal.stopped(folder, kept, len(plan.left), again=bool(command.out or command.experiment))
+            raise
+    if not plan.left:
+        _begin(plan, run)
+    rows = collect(folder)
+    run.note(folder, "finished", kept, failed)
+    terminal.summary(rows, plan)
+    if command.experiment is not None:
+        from uavexp.report.make import make_report
+
+        terminal.say("writing the report ...")
+        terminal.files(make_report(folder, terminal.say), folder)
+    terminal.say(str(folder))
+    return 1 if failed else 0
+
+
+def _ending(error: BaseException, folder: Path) -> str:
+    """How a run ended that did not finish, without the place of its folder."""
+    if isinstance(error, KeyboardInterrupt):
+        return "interrupted"
+    return f"failed: {one_line(error).replace(str(folder), folder.name)}"
+
+
+def _fly(plan: Plan, runner: Runner, watch: Watch) -> Generator[Done, None, None]:
+    """Fly what is left, each trial in a process of its own."""
+    workers = min(runner.workers, max(1, len(plan.left)))
+    if runner.backend == Backend.DASK:
+        return run_dask(
+            fly_task_elsewhere,
+            plan.left,
+            address=runner.address,
+            queue=runner.queue,
+            n_jobs=workers,
+            limits=runner.limits,
+            preload=[PRELOAD],
+            version=version,
+        )
+    return run_local(fly_task, plan.left, n_jobs=workers, limits=runner.limits, watch=watch)
+
+
+def _refuse_bad_input(plan: Plan, done: Done) -> None:
+    """End a command of one trial that cannot be flown as asked, before anything is kept."""
+    if len(plan.jobs) == 1 and done.answer.mendable:
+        raise ConfigError(done.answer.reason.partition(": ")[2])
+
+
+def _begin(plan: Plan, run: Run) -> None:
+    """Say what the folder is about and who flies into it, and put away what was found broken in it."""
+    folder = plan.study.folder
+    remove_unfinished(folder)
+    for name in plan.stock.damaged:
+        set_aside(folder, name)
+    write_text(folder / STUDY, study_text(plan.study))
+    run.note(folder, FLYING)
+
+
+def _keep(folder: Path, done: Done) -> None:
+    """Write a trial; its world first, so that the record vouches for it."""
+    if done.answer.status is Status.OK:
+        digest, data = done.answer.value.world
+        if data is not None:
+            put_world(folder, digest, data)
+    put_trial(folder, done.job.name, files_of(done.job, done.answer, done.wall_s))
+
+
+@contextlib.contextmanager
+def _worlds_checked(plan: Plan) -> Iterator[Callable[[], None]]:
+    """Check the worlds beside the first flights, of which none is kept before this has ended well."""
+    tasks = [job.payload for job in plan.left] if len(plan.jobs) > 1 else []
+    with ThreadPoolExecutor(max_workers=1) as pool:
+        yield pool.submit(_check_worlds, tasks).result
+
+
+def _check_worlds(tasks: Sequence[Task]) -> None:
+    """Make the first seed of each distinct world, so that a bad one is told before anything is kept."""
+    checked: list[Any] = []
+    for task in tasks:
+        world = task.cell.config["world"], task.cell.config["world_seed"]
+        if world not in checked:
+            checked.append(world)
+            try:
+                check_world(task.cell, task.seed)
+            except UavexpError:
+                raise
+            except Exception as error:
+                raise ConfigError(f"world={task.cell.options['world']}: {reason_of(error)}") from error
+
+
+def _compile_kernels(job: Job) -> None:
+    """Fly the first seconds of a trial in a process of its own, which leaves its kernels in the cache."""
+    process = multiprocessing.get_context("spawn").Process(target=_warm_up, args=(job.payload,), daemon=True)
+    process.start()
+    process.join()
+
+
+def _warm_up(task: Task) -> None:
+    def stop(time_s: float, _: str) -> None:
+        if time_s >= _WARM_UP_S:
+            raise SystemExit
+
+    with contextlib.suppress(Exception):  # the trial itself tells what is wrong
+        fly_cell(task.cell, task.seed, stop)

@@ -1,0 +1,80 @@
+"""A trial to fly as a job of a sweep: what goes to the child, and what comes back."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from uavexp.config.composition import Cell
+from uavexp.errors import RecordError
+from uavexp.flight import fly_cell
+from uavexp.store.outputs import failure_files, trial_files
+from uavexp.store.records import code_digest, lock_digest
+from uavexp.store.worlds import is_whole, world_bytes
+from uavexp.sweep.job import Answer, Job, Progress
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Task:
+    """One trial to fly; the payload of its job."""
+
+    cell: Cell
+    seed: int
+    identity: dict[str, Any]  # what makes it this trial (`outputs.identity`), and the seed
+    version: dict[str, Any]  # code and lock digests
+    command: str  # that repeats it
+    worlds: Path  # where worlds are kept that need not be sent again
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Flown:
+    """A flown trial as the files that it becomes."""
+
+    files: dict[str, bytes]
+    world: tuple[str, bytes | None]  # digest; content, if it is not kept yet
+    outcome: str
+    success: bool
+    reason: str
+
+
+def fly_task(task: Task, progress: Progress) -> Flown:
+    """Fly one trial and return its files; nothing is written here."""
+    begin_s = time.perf_counter()
+    trial = fly_cell(task.cell, task.seed, progress)
+    wall = {"command": task.command, "wall_trial_s": time.perf_counter() - begin_s}
+    digest = trial.world.digest
+    known = is_whole(task.worlds / f"{digest}.npz")
+    return Flown(
+        files=trial_files(trial, {**task.identity, **task.version}, wall),
+        world=(digest, None if known else world_bytes(trial.world)),
+        outcome=str(trial.log.outcome),
+        success=bool(trial.metrics["success"]),
+        reason=trial.log.reason,
+    )
+
+
+def version() -> dict[str, Any]:
+    """What a record says of the code that wrote it: digests of uavexp and of its lock file."""
+    return {"code": code_digest(), "lock": lock_digest()}
+
+
+def fly_task_elsewhere(task: Task, progress: Progress) -> Flown:
+    """Fly one trial on a worker, which must run the version that the record will name.
+
+    Raises:
+        RecordError: it runs another one.
+    """
+    if version() != task.version:
+        raise RecordError("this Dask worker runs another version of uavexp than the command")
+    return fly_task(task, progress)
+
+
+def files_of(job: Job, answer: Answer, wall_s: float) -> dict[str, bytes]:
+    """Files that a trial leaves behind, flown or not."""
+    if isinstance(answer.value, Flown):
+        return answer.value.files
+    task: Task = job.payload
+    wall = {"command": task.command, "wall_trial_s": wall_s}
+    return failure_files(answer, {**task.identity, **task.version}, wall)
