@@ -9,7 +9,6 @@ from itertools import product
 import numpy as np
 import pandas as pd
 
-from uavexp.arrays import Float
 from uavexp.report import cells, shown
 from uavexp.report.claims import claims_of
 from uavexp.report.comparison import SCENE, Metric, Panel, estimate
@@ -160,10 +159,6 @@ def _per_scene(panel: Panel, order: Sequence[str]) -> Table:
         ),
         notes=("Means over the worlds of a scene.",),
     )
-
-
-def _mean(values: Float) -> float:
-    return float(np.nanmean(values)) if np.isfinite(values).any() else math.nan
 
 
 def _difficulty(trials: pd.DataFrame, order: Sequence[str]) -> Table:

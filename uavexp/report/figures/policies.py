@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,7 +24,7 @@ Fill = tuple[str, str]  # colour, hatch
 _HATCHES = ("", "////", "....", "\\\\\\\\", "xxxx", "----", "++++", "oooo", "||||")
 _CAUSE_FILLS: dict[str, Fill] = {
     metric.column: (style.cause_mark(metric.column.removeprefix("replans_")).colour, hatch)
-    for metric, hatch in zip(CAUSES, _HATCHES, strict=False)
+    for metric, hatch in zip(CAUSES, cycle(_HATCHES), strict=False)
 }
 _WORTH_FILLS: dict[str, Fill] = {WORTH[0].column: (style.BLUE, ""), WORTH[1].column: ("#E4E4E4", "////")}
 
