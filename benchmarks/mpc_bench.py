@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tests.fields import bounds, empty, field_from
 from uavexp.arrays import Float
+from uavexp.check.fields import bounds, empty, field_from
 from uavexp.field import DistanceField
 from uavexp.planner.bspline_mpc import BsplineMpc
 from uavexp.planner.movers.moving import MovingObstacles

@@ -9,7 +9,7 @@ import gc
 
 import numpy as np
 
-from tests.fields import bounds, field_from, warehouse
+from uavexp.check.fields import bounds, field_from, warehouse
 from uavexp.geometry import polyline_length_m
 from uavexp.planner.min_acc import MinAcc
 from uavexp.trajectory import evaluate

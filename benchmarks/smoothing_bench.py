@@ -13,8 +13,8 @@ from functools import partial
 
 import numpy as np
 
-from tests.fields import bounds, field_from, warehouse
 from uavexp.arrays import Float
+from uavexp.check.fields import bounds, field_from, warehouse
 from uavexp.geometry import polyline_length_m
 from uavexp.planner.find.free_space import FreeSpace, free_space
 from uavexp.planner.find.grid import PathSearch

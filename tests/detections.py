@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from tests.fields import box, empty, field_from
 from uavexp.arrays import Float
+from uavexp.check.fields import box, empty, field_from
 from uavexp.field import DistanceField
 from uavexp.types import Bodies, RayScan, Shape
 

@@ -9,8 +9,8 @@ import pytest
 
 from tests.components import build, check_yaml, numbers, options
 from tests.detections import WALLS, bodies_at, room_map, scans, straight
-from tests.scans import take_scan
-from tests.triggers import LIMITS
+from uavexp.check.hall import LIMITS
+from uavexp.check.scans import take_scan
 from uavexp.errors import ConfigError
 from uavexp.types import Scan, Tracks
 

@@ -22,7 +22,7 @@ LAYERS = (
     {"recorder", "pilot", "trial"},
     {"config"},
     {"flight", "__init__"},
-    {"store", "report", "sweep", "cli", "__main__"},
+    {"store", "report", "sweep", "cli", "check", "__main__"},
 )
 HYDRA = ("hydra", "omegaconf")
 

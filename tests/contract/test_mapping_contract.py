@@ -11,7 +11,7 @@ from omegaconf import OmegaConf
 
 from tests.exact_distance import exact_field
 from tests.folders import CONF
-from tests.scans import Box, take_scan
+from uavexp.check.scans import Box, take_scan
 from uavexp.errors import ConfigError, WorldError
 from uavexp.field import FREE, OCCUPIED, UNKNOWN
 from uavexp.mapping.base import MapBackend

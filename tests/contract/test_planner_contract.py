@@ -11,8 +11,8 @@ from hydra.utils import get_class
 from omegaconf import OmegaConf
 
 from tests.components import CONF, numbers, options
-from tests.fields import bounds, box, empty, field_from, warehouse
 from uavexp.arrays import Bool, Float
+from uavexp.check.fields import bounds, box, empty, field_from, warehouse
 from uavexp.errors import ConfigError
 from uavexp.field import DistanceField
 from uavexp.planner.base import Planner

@@ -12,9 +12,9 @@ import pytest
 
 import uavexp
 from tests.components import build, check_yaml, numbers, options
-from tests.fields import empty
-from tests.triggers import LIMITS, STRAIGHT, change, goal_at, observe, room
 from uavexp.braking import with_stop
+from uavexp.check.fields import empty
+from uavexp.check.hall import LIMITS, STRAIGHT, change, goal_at, observe, room
 from uavexp.errors import ConfigError
 from uavexp.field import DistanceField
 from uavexp.metrics.replanning import CAUSES, blocked_delays

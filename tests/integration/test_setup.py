@@ -17,8 +17,8 @@ import pytest
 import yaml
 from packaging.requirements import Requirement
 
-from tests.fields import field_from
 from tests.folders import ROOT
+from uavexp.check.fields import field_from
 from uavexp.trajectory import evaluate
 from uavexp.types import Goal, Limits, PlanRequest, PlanStatus
 

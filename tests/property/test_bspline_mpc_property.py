@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.fields import bounds, box, empty, field_from
+from uavexp.check.fields import bounds, box, empty, field_from
 from uavexp.planner.bspline_mpc import BsplineMpc
 from uavexp.planner.mpc.regions import facing
 from uavexp.trajectory import evaluate

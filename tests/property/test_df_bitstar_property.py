@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.fields import bounds, box, empty, field_from
+from uavexp.check.fields import bounds, box, empty, field_from
 from uavexp.planner.df_bitstar import DfBitstar, Edges
 from uavexp.planner.find.tree.motion import cubic_time, least_time
 from uavexp.trajectory import evaluate

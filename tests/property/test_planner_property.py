@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.fields import bounds, box, empty, field_from
+from uavexp.check.fields import bounds, box, empty, field_from
 from uavexp.planner.min_acc import MinAcc
 from uavexp.trajectory import evaluate
 from uavexp.types import Goal, Limits, PlanRequest, PlanStatus

@@ -20,10 +20,10 @@ from tests.detections import (
     straight,
     unknown_map,
 )
-from tests.fields import box, field_from
-from tests.scans import take_scan
-from tests.triggers import LIMITS
 from uavexp.arrays import Bool, Float
+from uavexp.check.fields import box, field_from
+from uavexp.check.hall import LIMITS
+from uavexp.check.scans import take_scan
 from uavexp.detection.clusters import cluster, split
 from uavexp.detection.returns import returns, without
 from uavexp.field import OCCUPIED, DistanceField

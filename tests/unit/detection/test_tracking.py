@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.fields import empty, field_from
 from tests.logs import make_log
 from uavexp.arrays import Float
 from uavexp.bodies import ABSENT_M
+from uavexp.check.fields import empty, field_from
 from uavexp.detection.clusters import Clusters
 from uavexp.detection.kalman import Estimate, Motion, MotionFilter, estimated
 from uavexp.detection.tracker import Tracker, TrackRule, centres_m

@@ -9,7 +9,7 @@ import pytest
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
-from tests.fields import box, empty, field_from
+from uavexp.check.fields import box, empty, field_from
 from uavexp.explorer.planar import (
     ascend,
     connected_components,

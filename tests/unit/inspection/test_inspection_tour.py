@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.fields import box, empty, field_from
 from uavexp.arrays import Float
+from uavexp.check.fields import box, empty, field_from
 from uavexp.errors import ConfigError
 from uavexp.inspection import clusters as runs
 from uavexp.inspection.lattice import lattice_of

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from tests.fields import box, empty, field_from
 from uavexp.arrays import Float
+from uavexp.check.fields import box, empty, field_from
 from uavexp.inspection.reference import Surface
 from uavexp.inspection.view_angle import Weights, blocked_viewpoints, cell_weights, choose_yaw
 from uavexp.inspection.viewpoints import Viewpoints

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.fields import field_from
+from uavexp.check.fields import field_from
 from uavexp.errors import ConfigError
 from uavexp.field import FREE, OCCUPIED, UNKNOWN
 from uavexp.mapping.projection import project

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.contract.test_mapping_contract import NOTHING, OPTIONS, begin, centres, occupied
-from tests.scans import Box, ring_directions, take_ray_scan, take_scan
+from uavexp.check.scans import Box, ring_directions, take_ray_scan, take_scan
 from uavexp.field import FREE, OCCUPIED, UNKNOWN
 from uavexp.mapping.dense import Dense
 from uavexp.types import RayScan

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from tests.unit.test_trigger import LIMITS, STRAIGHT, change, observe
 
-from tests.fields import box, empty, field_from
 from uavexp.braking import stopping_distance_m
+from uavexp.check.fields import box, empty, field_from
 from uavexp.field import UNKNOWN, DistanceField
 from uavexp.safety.brake import Brake
 from uavexp.safety.none import NoBrake

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from tests.triggers import LIMITS, STRAIGHT, observe, room
+from uavexp.check.hall import LIMITS, STRAIGHT, observe, room
 from uavexp.config.build import GROUPS, build, nested_groups
 from uavexp.config.composition import Cell, Composer
 from uavexp.config.overrides import parse_settings

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.triggers import LIMITS, STRAIGHT, observe, room
 from uavexp.arrays import Float
+from uavexp.check.hall import LIMITS, STRAIGHT, observe, room
 from uavexp.errors import ConfigError
 from uavexp.trigger.risk import Risk, approaches
 from uavexp.types import Observation, Tracks

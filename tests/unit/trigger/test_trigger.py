@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from tests.triggers import LIMITS, STRAIGHT, change, goal_at, observe, room
+from uavexp.check.hall import LIMITS, STRAIGHT, change, goal_at, observe, room
 from uavexp.errors import ConfigError
 from uavexp.field import DistanceField
 from uavexp.trigger.change import changed_near

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.fields import empty
-from tests.triggers import LIMITS, STRAIGHT, goal_at, observe, room
 from uavexp.arrays import Bool
 from uavexp.braking import with_stop
+from uavexp.check.fields import empty
+from uavexp.check.hall import LIMITS, STRAIGHT, goal_at, observe, room
 from uavexp.field import DistanceField
 from uavexp.trigger.base import TriggerPolicy
 from uavexp.trigger.collision_check import CollisionCheck

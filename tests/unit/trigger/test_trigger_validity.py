@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.fields import box, empty, field_from
-from tests.triggers import LIMITS, STRAIGHT, goal_at, observe, room
 from uavexp.braking import with_stop
+from uavexp.check.fields import box, empty, field_from
+from uavexp.check.hall import LIMITS, STRAIGHT, goal_at, observe, room
 from uavexp.recorder import remaining_clearance_m
 from uavexp.trajectory import Trajectory, evaluate
 from uavexp.trigger.distance import flown_m

@@ -7,9 +7,9 @@ import pytest
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from tests.fields import bounds, box, empty, field_from, warehouse
 from tests.folders import SHARED
 from uavexp.arrays import Float
+from uavexp.check.fields import bounds, box, empty, field_from, warehouse
 from uavexp.field import DistanceField
 from uavexp.planner.find.grid import PathSearch
 from uavexp.types import PlanStatus

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.fields import bounds, box, empty, field_from
 from uavexp.arrays import Float
+from uavexp.check.fields import bounds, box, empty, field_from
 from uavexp.errors import ConfigError
 from uavexp.geometry import polyline_length_m
 from uavexp.planner.bitstar import Bitstar

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from tests.contract.test_planner_contract import LIMITS, ask
-from tests.fields import box, empty, field_from
 from tests.voxel_paths import is_path, random_grid, turning
+from uavexp.check.fields import box, empty, field_from
 from uavexp.errors import ConfigError
 from uavexp.geometry import polyline_length_m
 from uavexp.metrics.voxel_path import (

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from tests.contract.test_planner_contract import LIMITS, ask
-from tests.fields import box, empty, field_from
 from tests.folders import SHARED
 from tests.voxel_paths import is_path, random_grid, shortest
+from uavexp.check.fields import box, empty, field_from
 from uavexp.errors import ConfigError
 from uavexp.planner.astar import Astar
 from uavexp.planner.find.voxel.benchmark import main, read_map, read_scenarios

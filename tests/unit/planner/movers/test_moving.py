@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.components import build
-from tests.fields import bounds, box, empty, field_from
-from tests.triggers import LIMITS
 from uavexp.arrays import Float
+from uavexp.check.fields import bounds, box, empty, field_from
+from uavexp.check.hall import LIMITS
 from uavexp.planner.movers.escape import stops
 from uavexp.planner.movers.moving import MovingObstacles, clearance_after
 from uavexp.trajectory import evaluate

@@ -10,8 +10,8 @@ import pytest
 from scipy.integrate import quad
 from scipy.interpolate import BSpline
 
-from tests.fields import bounds, box, empty, field_from
 from uavexp.arrays import Float
+from uavexp.check.fields import bounds, box, empty, field_from
 from uavexp.errors import ConfigError
 from uavexp.planner.bspline_mpc import BsplineMpc
 from uavexp.planner.movers.moving import MovingObstacles

@@ -9,8 +9,8 @@ import pytest
 from scipy.ndimage import binary_erosion
 from scipy.spatial import cKDTree
 
-from tests.fields import bounds, box, empty, field_from, warehouse
 from uavexp.arrays import Float
+from uavexp.check.fields import bounds, box, empty, field_from, warehouse
 from uavexp.planner.find.free_space import free_space, straight_is_free
 from uavexp.planner.find.grid import PathSearch
 from uavexp.planner.shape.corridor import Corridor, make_corridor

@@ -10,8 +10,8 @@ import pytest
 from scipy.interpolate import BSpline
 from scipy.optimize import LinearConstraint, NonlinearConstraint, minimize
 
-from tests.fields import bounds, box, empty, field_from
 from uavexp.arrays import Bool, Float
+from uavexp.check.fields import bounds, box, empty, field_from
 from uavexp.errors import ConfigError
 from uavexp.field import DistanceField
 from uavexp.geometry import polyline_length_m

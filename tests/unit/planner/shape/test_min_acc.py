@@ -8,8 +8,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from tests.fields import bounds, box, empty, field_from
 from uavexp.arrays import Bool, Float
+from uavexp.check.fields import bounds, box, empty, field_from
 from uavexp.errors import ConfigError
 from uavexp.field import DistanceField
 from uavexp.geometry import polyline_length_m

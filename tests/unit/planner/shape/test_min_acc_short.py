@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tests.unit.test_trigger import LIMITS
 
-from tests.fields import bounds, empty, field_from
+from uavexp.check.fields import bounds, empty, field_from
 from uavexp.planner.min_acc import MinAcc
 from uavexp.trajectory import evaluate
 from uavexp.types import Goal, PlanRequest

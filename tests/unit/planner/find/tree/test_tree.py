@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.fields import bounds, box, empty, field_from
 from uavexp.arrays import Float
+from uavexp.check.fields import bounds, box, empty, field_from
 from uavexp.errors import ConfigError
 from uavexp.geometry import polyline_length_m
 from uavexp.planner.df_bitstar import DfBitstar, Edges

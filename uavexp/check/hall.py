@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tests.fields import box, empty, field_from
 from uavexp.arrays import Bool
+from uavexp.check.fields import box, empty, field_from
 from uavexp.field import DistanceField
 from uavexp.trajectory import Trajectory
 from uavexp.types import Goal, Limits, MapUpdate, Observation, Reference, State

@@ -1,4 +1,4 @@
-"""Distance fields for planner tests, made from boolean occupancy with scipy's exact transform."""
+"""Distance fields to check against, made from boolean occupancy with scipy's exact transform."""
 
 from __future__ import annotations
 

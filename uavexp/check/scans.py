@@ -1,4 +1,4 @@
-"""Scans of box worlds by the slab method: an oracle independent of the package's renderer."""
+"""Scans of box worlds by the slab method: independent of the package's renderer."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ def camera_rotation(yaw_rad: float, pitch_rad: float = 0.0) -> Float:
     c, s = np.cos(yaw_rad), np.sin(yaw_rad)
     level = np.array([[s, 0.0, c], [-c, 0.0, s], [0.0, -1.0, 0.0]])
     c, s = np.cos(pitch_rad), np.sin(pitch_rad)
-    return level @ np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+    turned: Float = level @ np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+    return turned
 
 
 def take_scan(
