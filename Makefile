@@ -12,7 +12,7 @@ SUPPORTED := import sys; (3, 11) <= sys.version_info < (3, 14) or sys.exit(1); p
 PYTHON ?= $(shell for name in $(PYTHONS); do $$name -c '$(SUPPORTED)' 2>/dev/null && break; done)
 UV ?= $(shell uv --version >/dev/null 2>&1 && echo uv)
 
-.PHONY: run test check bench golden lock clean
+.PHONY: run test check bench golden conf lock clean
 .DELETE_ON_ERROR:
 
 run: $(STAMP)
@@ -32,6 +32,10 @@ bench: $(STAMP)
 # The digests of the golden flights, after a change of numbers that CHANGELOG names
 golden: $(STAMP)
 	@$(BIN)/python -m tests.golden
+
+# conf/<group>/<option>.yaml of every option, from the fields of its class
+conf: $(STAMP)
+	@$(BIN)/python -m uavexp.config.generate
 
 # The environment: exactly the locked packages, then this project itself, editable, built by the
 # locked back end. Remade when the lock changes; an interpreter that no longer runs is replaced.

@@ -1,4 +1,11 @@
-"""Checks plain values against the annotations of the class that will take them."""
+"""A parameter is declared once: a field of its option with type, bounds, default and one sentence.
+
+    @option
+    class Brake:
+        margin_m: NonNegative = 0.03  # m, the path counts as blocked below body radius + this [ours]
+
+The check below reads type and bounds, `uavexp.config.generate` all four (`make conf`).
+"""
 
 from __future__ import annotations
 
@@ -9,20 +16,90 @@ import inspect
 import math
 import types
 import typing
-from collections.abc import Iterable, Mapping, Sequence
-from enum import Enum
-from typing import Any, Literal, Union, get_args, get_origin
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from enum import Enum, StrEnum
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
-from uavexp.errors import ConfigError
+from uavexp.errors import ConfigError, require
 
 MISSING = "???"  # OmegaConf's mark of a value that must be given
+T = TypeVar("T")
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Rule:
+    """What a value must be beyond its type, in words and as a test."""
+
+    words: str
+    holds: Callable[[Any], bool]
+
+
+def above(least: float) -> Rule:
+    """Greater than a number."""
+    return Rule(f"> {least:g}", lambda value: value > least)
+
+
+def at_least(least: float) -> Rule:
+    """A number or more."""
+    return Rule(f">= {least:g}", lambda value: value >= least)
+
+
+def at_most(most: float) -> Rule:
+    """A number or less."""
+    return Rule(f"<= {most:g}", lambda value: value <= most)
+
+
+def between(least: float, most: float) -> Rule:
+    """From one number to another, both included."""
+    return Rule(f"{least:g} to {most:g}", lambda value: least <= value <= most)
+
+
+FINITE = Rule("finite", math.isfinite)
+Finite = Annotated[float, FINITE]
+Positive = Annotated[float, above(0), FINITE]
+NonNegative = Annotated[float, at_least(0), FINITE]
+Share = Annotated[float, between(0, 1)]
+Count = Annotated[int, at_least(1)]
+Vector = tuple[Finite, Finite, Finite]
+Range = Annotated[tuple[Positive, Positive], Rule("[least, greatest]", lambda pair: pair[0] <= pair[1])]
+
+
+class Unknown(StrEnum):
+    """Whether plans may enter space never seen; one word for the whole trial (`${unknown}`)."""
+
+    OPTIMISTIC = "optimistic"  # as if it were free
+    CONSERVATIVE = "conservative"
+
+
+@typing.dataclass_transform(kw_only_default=True, field_specifiers=(dataclasses.field,))
+def option(cls: type[T]) -> type[T]:
+    """Make a class an option of its group: a dataclass whose parameters are checked and converted.
+
+    Its own `__post_init__` comes after that, for what ties parameters together.
+    """
+    then = getattr(cls, "__post_init__", None)
+
+    def __post_init__(self: Any) -> None:
+        for name, annotation in parameter_types(self.__class__).items():
+            object.__setattr__(self, name, check_value(name, getattr(self, name), annotation))
+        if then is not None:
+            then(self)
+
+    cls.__post_init__ = __post_init__  # type: ignore[attr-defined]
+    cls.__option__ = True  # type: ignore[attr-defined]
+    return dataclasses.dataclass(slots=True, kw_only=True)(cls)
+
+
+def is_option(item: object) -> bool:
+    """Whether an object is a class that `option` has made (not one that only inherits from it)."""
+    return isinstance(item, type) and "__option__" in vars(item)
 
 
 @functools.cache
 def parameter_types(cls: type) -> dict[str, Any]:
     """Name and annotation of every constructor parameter of a component class."""
     if dataclasses.is_dataclass(cls):
-        hints = typing.get_type_hints(cls)
+        hints = typing.get_type_hints(cls, include_extras=True)
         return {item.name: hints[item.name] for item in dataclasses.fields(cls) if item.init}
     signature = inspect.signature(cls, eval_str=True)
     return {
@@ -43,19 +120,23 @@ def check_value(name: str, value: Any, annotation: Any) -> Any:
     """Return the value in the annotated type: 5 becomes 5.0, a list a tuple, a word an enum's member.
 
     Raises:
-        ConfigError: a value of another type, NaN, or a missing one; names what is allowed.
+        ConfigError: a value of another type, NaN, out of bounds, or a missing one; names what is allowed.
     """
     if value == MISSING:
         raise ConfigError(f"{name} must be given: type {name}=VALUE ({describe(annotation)})")
     try:
-        return _convert(value, annotation)
+        return _convert(name, value, annotation)
+    except ConfigError:
+        raise
     except (TypeError, ValueError, ArithmeticError) as error:
         raise ConfigError(f"{name} must be {describe(annotation)}, got {value!r}") from error
 
 
 def describe(annotation: Any) -> str:
-    """An annotation in words."""
+    """A type in words; bounds speak for themselves."""
     origin, arguments = get_origin(annotation), get_args(annotation)
+    if origin is Annotated:
+        return describe(arguments[0])
     if origin in (Union, types.UnionType):
         return " or ".join(describe(item) for item in arguments)
     if origin is Literal:
@@ -83,40 +164,53 @@ def plain(value: Any) -> Any:
     return value
 
 
-def _convert(value: Any, annotation: Any) -> Any:
+def _convert(name: str, value: Any, annotation: Any) -> Any:
     origin, arguments = get_origin(annotation), get_args(annotation)
     if annotation is Any or annotation is object:
         return value
+    if origin is Annotated:
+        return _ruled(name, _convert(name, value, arguments[0]), arguments[1:])
     if origin in (Union, types.UnionType):
-        return _convert_union(value, arguments)
+        return _convert_union(name, value, arguments)
     if origin is Literal:
         return _member(value, value in arguments)
     if origin in (list, Sequence):
-        return [_convert(item, arguments[0]) for item in _sequence(value)]
+        return _convert_items(name, _sequence(value), [arguments[0]] * len(value))
     if origin is tuple:
-        return _convert_tuple(_sequence(value), arguments)
+        items = _sequence(value)
+        kinds = arguments[:1] * len(items) if arguments[-1] is Ellipsis else arguments
+        return tuple(_convert_items(name, items, kinds))
     if origin is dict or origin is Mapping:
         if not isinstance(value, Mapping):
             raise TypeError
-        return {_convert(key, arguments[0]): _convert(item, arguments[1]) for key, item in value.items()}
+        kind, item_kind = arguments
+        pairs = ((_convert(name, key, kind), item) for key, item in value.items())
+        return {key: _convert(f"{name}.{key}", item, item_kind) for key, item in pairs}
     if isinstance(annotation, type):
         return _convert_scalar(value, annotation)
     return value
 
 
-def _convert_union(value: Any, members: tuple[Any, ...]) -> Any:
+def _ruled(name: str, value: Any, rules: Iterable[Rule]) -> Any:
+    words = " and ".join(rule.words for rule in rules)
+    require(all(rule.holds(value) for rule in rules), f"{name} must be {words}, got {plain(value)}")
+    return value
+
+
+def _convert_union(name: str, value: Any, members: Iterable[Any]) -> Any:
     for member in members:
         try:
-            return _convert(value, member)
+            return _convert(name, value, member)
+        except ConfigError:  # of this type, but out of bounds
+            raise
         except (TypeError, ValueError):
             continue
     raise TypeError
 
 
-def _convert_tuple(value: list[Any] | tuple[Any, ...], items: tuple[Any, ...]) -> tuple[Any, ...]:
-    if items and items[-1] is Ellipsis:
-        return tuple(_convert(item, items[0]) for item in value)
-    return tuple(_convert(item, kind) for item, kind in zip(value, items, strict=True))
+def _convert_items(name: str, values: Sequence[Any], kinds: Sequence[Any]) -> list[Any]:
+    pairs = enumerate(zip(values, kinds, strict=True))
+    return [_convert(f"{name}[{n}]", item, kind) for n, (item, kind) in pairs]
 
 
 def _convert_scalar(value: Any, kind: type) -> Any:

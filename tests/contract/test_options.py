@@ -24,6 +24,7 @@ from uavexp.config.build import (
     protocol_of,
 )
 from uavexp.config.composition import Composer
+from uavexp.config.generate import option_files
 from uavexp.config.options import PRESET_GROUP, RUNNER_GROUP, read_option
 from uavexp.config.overrides import Setting, parse_settings
 from uavexp.parameters import MISSING, check_value, parameter_types, plain, required_parameters
@@ -67,6 +68,11 @@ def test_the_defaults_of_no_group_are_those_of_a_trial() -> None:
     config = yaml.safe_load((CONF / "config.yaml").read_text())
     defaults = {item.name: item.default for item in dataclasses.fields(Parts) if item.name in TOP_LEVEL}
     assert {key: config[key] for key in TOP_LEVEL} == defaults
+
+
+def test_the_yaml_of_every_option_is_what_make_conf_writes() -> None:
+    for path, text in option_files().items():
+        assert path.read_text(encoding="utf-8") == text, "make conf"
 
 
 @pytest.mark.parametrize("group", GROUPS)

@@ -13,7 +13,6 @@ attitude by the lag of rate loop and rotors was tried and is worse: the rate suf
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 
 import numba as nb
 
@@ -21,7 +20,8 @@ from uavexp.arrays import Float
 from uavexp.controller.position_velocity import PositionVelocity
 from uavexp.flatness import attitude_and_rate
 from uavexp.geometry import GRAVITY_MPS2, rotation_from_quaternion
-from uavexp.types import Command, Limits, Reference, State
+from uavexp.parameters import NonNegative, option
+from uavexp.types import Command, Reference, State
 
 
 @nb.njit(cache=True)
@@ -46,45 +46,22 @@ def _feed_forward(
     return turned
 
 
-@dataclass(slots=True, kw_only=True)
-class Flatness:
+@option
+class Flatness(PositionVelocity):
     """Position-velocity loop with body-rate feed-forward from differential flatness."""
 
-    rate_hz: float = 100.0
-    position_gain_per_s: float = 2.0
-    velocity_gain_per_s: float = 5.0
-    max_correction_mps: float = 1.0
-    max_tilt_rad: float = 0.6
-    drag_kgpm: float = 0.0026
-    _loop: PositionVelocity = field(init=False, repr=False)
-    _drag_per_m: float = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        """Check every parameter."""
-        self._loop = PositionVelocity(
-            rate_hz=self.rate_hz,
-            position_gain_per_s=self.position_gain_per_s,
-            velocity_gain_per_s=self.velocity_gain_per_s,
-            max_correction_mps=self.max_correction_mps,
-            max_tilt_rad=self.max_tilt_rad,
-            drag_kgpm=self.drag_kgpm,
-        )
-
-    def reset(self, limits: Limits, mass_kg: float) -> None:
-        """Begin a trial of a vehicle of this mass."""
-        self._loop.reset(limits, mass_kg)
-        self._drag_per_m = self.drag_kgpm / mass_kg
+    drag_kgpm: NonNegative = 0.0026  # kg/m, c in the drag force c v^2 to make up for: the quadrotor's [ours]
 
     def command(self, estimated_state: State, reference: Reference) -> Command:
         """Return thrust, attitude and body rate that lead the state to the reference."""
-        wanted = self._loop.command(estimated_state, reference)
+        wanted = PositionVelocity.command(self, estimated_state, reference)
         rate = _feed_forward(
             reference.velocity_mps,
             reference.acceleration_mps2,
             reference.jerk_mps3,
             float(reference.yaw_rad),
             float(reference.yaw_rate_radps),
-            self._drag_per_m,
+            self.drag_kgpm / self._mass_kg,
             wanted.quaternion_wxyz,
         )
         return Command(thrust_N=wanted.thrust_N, quaternion_wxyz=wanted.quaternion_wxyz, body_rate_radps=rate)

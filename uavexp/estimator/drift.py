@@ -14,25 +14,26 @@ an odometry that smoothly believes its own motion. [ours]: the paper names drift
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from uavexp.arrays import Float
-from uavexp.errors import require, require_non_negative, require_positive
+from uavexp.errors import require
 from uavexp.geometry import multiply_quaternions, quaternion_from_yaw, rotation_from_quaternion
+from uavexp.parameters import NonNegative, Positive, option
 from uavexp.types import State
 
 
-@dataclass(slots=True, kw_only=True)
+@option
 class Drift:
     """Random walk of position and yaw with bounded drift rates."""
 
-    position_drift_mps: float = 0.02
-    max_position_drift_mps: float = 0.05
-    yaw_drift_radps: float = 0.002
-    max_yaw_drift_radps: float = 0.005
-    correlation_time_s: float = 2.0
+    position_drift_mps: NonNegative = 0.02  # m/s, rms of the position drift rate (three axes together) [ours]
+    max_position_drift_mps: NonNegative = 0.05  # m/s, largest position drift rate [ours]
+    yaw_drift_radps: NonNegative = 0.002  # rad/s, rms of the yaw drift rate [ours]
+    max_yaw_drift_radps: NonNegative = 0.005  # rad/s, largest yaw drift rate [ours]
+    correlation_time_s: Positive = 2.0  # s, how long a drift rate lasts [ours]
     _rng: np.random.Generator = field(init=False, repr=False)
     _position_rate_mps: Float = field(init=False, repr=False)
     _yaw_rate_radps: float = field(init=False, repr=False)
@@ -40,14 +41,6 @@ class Drift:
     _yaw_error_rad: float = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Check every parameter."""
-        require_non_negative(
-            position_drift_mps=self.position_drift_mps,
-            max_position_drift_mps=self.max_position_drift_mps,
-            yaw_drift_radps=self.yaw_drift_radps,
-            max_yaw_drift_radps=self.max_yaw_drift_radps,
-        )
-        require_positive(correlation_time_s=self.correlation_time_s)
         for name, rms, bound in (
             ("max_position_drift_mps", self.position_drift_mps, self.max_position_drift_mps),
             ("max_yaw_drift_radps", self.yaw_drift_radps, self.max_yaw_drift_radps),

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from uavexp.parameters import option
 from uavexp.types import State
 
 
-@dataclass(slots=True, kw_only=True)
+@option
 class Perfect:
     """Returns the true state."""
 

@@ -2,29 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from uavexp.braking import stopping_distance_m
-from uavexp.errors import require, require_non_negative
+from uavexp.errors import require
+from uavexp.parameters import NonNegative, option
 from uavexp.trajectory import evaluate, sample_times
 from uavexp.types import Limits, Observation
 
 _SAMPLE_S = 0.04  # at 2.5 m/s one voxel apart
 
 
-@dataclass(slots=True, kw_only=True)
+@option
 class Brake:
     """Brakes when the path within the stopping distance ahead is not known to be free."""
 
-    margin_m: float = 0.03
-    reaction_s: float = 0.2
-    stop_at_unknown: bool = True
+    margin_m: NonNegative = 0.03  # m, the path counts as blocked when its clearance is below body
+    # radius + this [ours]
+    reaction_s: NonNegative = 0.2  # s, flown on before braking begins: one ESDF period and the latency [ours]
+    stop_at_unknown: bool = True  # also brake before leaving known-free space
     _limits: Limits | None = field(init=False, repr=False, default=None)
-
-    def __post_init__(self) -> None:
-        require_non_negative(margin_m=self.margin_m, reaction_s=self.reaction_s)
 
     def reset(self, limits: Limits) -> None:
         """Begin a trial."""

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from uavexp.parameters import option
 from uavexp.types import Limits, Observation
 
 
-@dataclass(slots=True, kw_only=True)
+@option
 class NoBrake:
     """Never brakes; or nobody would ever collide and triggers could not be compared."""
 

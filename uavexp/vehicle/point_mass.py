@@ -11,14 +11,14 @@ acceleration.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numba as nb
 import numpy as np
 
 from uavexp.arrays import Float
-from uavexp.errors import require_positive
 from uavexp.geometry import GRAVITY_MPS2
+from uavexp.parameters import Positive, option
 from uavexp.types import Command, Limits, State
 
 
@@ -63,31 +63,19 @@ def _turned(q: Float, axis: Float, angle_rad: float) -> Float:
     return out / math.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2 + out[3] ** 2)
 
 
-@dataclass(slots=True, kw_only=True)
+@option
 class PointMass:
     """Point mass with ideal thrust and a rate-limited attitude."""
 
-    mass_kg: float = 0.75
-    length_m: float = 0.32
-    width_m: float = 0.32
-    height_m: float = 0.12
-    max_speed_mps: float = 2.5
-    max_acceleration_mps2: float = 2.5
-    max_body_rate_radps: float = 2.0
+    mass_kg: Positive = 0.75  # kg; paper 4
+    length_m: Positive = 0.32  # m, body box along x; paper 1
+    width_m: Positive = 0.32  # m, body box along y; paper 1
+    height_m: Positive = 0.12  # m, body box along z; paper 1
+    max_speed_mps: Positive = 2.5  # m/s; paper 1
+    max_acceleration_mps2: Positive = 2.5  # m/s^2 [ours]
+    max_body_rate_radps: Positive = 2.0  # rad/s, how fast the attitude turns at most; paper 1
     _x: Float = field(init=False, repr=False)
     _command: Float = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        """Check every parameter."""
-        require_positive(
-            mass_kg=self.mass_kg,
-            length_m=self.length_m,
-            width_m=self.width_m,
-            height_m=self.height_m,
-            max_speed_mps=self.max_speed_mps,
-            max_acceleration_mps2=self.max_acceleration_mps2,
-            max_body_rate_radps=self.max_body_rate_radps,
-        )
 
     @property
     def limits(self) -> Limits:
@@ -109,7 +97,7 @@ class PointMass:
         """Advance by `step_s` under a constant command and return the new state."""
         self._command[0] = command.thrust_N
         self._command[1:5] = command.quaternion_wxyz
-        _advance(self._x, self._command, float(self.mass_kg), float(self.max_body_rate_radps), step_s)
+        _advance(self._x, self._command, self.mass_kg, self.max_body_rate_radps, step_s)
         x = self._x.copy()
         return State(
             position_m=x[0:3], velocity_mps=x[3:6], quaternion_wxyz=x[6:10], body_rate_radps=x[10:13]

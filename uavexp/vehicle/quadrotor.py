@@ -22,15 +22,16 @@ bluff body), rotor lag, rotor inertia, speed range and the attitude loop are [ou
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from dataclasses import field
+from typing import Annotated, NamedTuple
 
 import numba as nb
 import numpy as np
 
 from uavexp.arrays import Float
-from uavexp.errors import require, require_non_negative, require_positive
+from uavexp.errors import require
 from uavexp.geometry import GRAVITY_MPS2
+from uavexp.parameters import NonNegative, Positive, between, option
 from uavexp.types import Command, Limits, State
 
 # layout of the state vector of the kernels
@@ -198,36 +199,40 @@ def _advance(
         integrate(x, rotors, plant, step_s / substeps, work)
 
 
-@dataclass(slots=True, kw_only=True)
+@option
 class Quadrotor:
     """Rigid-body quadrotor with rotor lag, drag and a rate-limited attitude loop."""
 
-    mass_kg: float = 0.75
-    inertia_x_kgm2: float = 0.015
-    inertia_y_kgm2: float = 0.015
-    inertia_z_kgm2: float = 0.024
-    thrust_coefficient_Ns2: float = 3.3e-5
-    torque_coefficient_Nms2: float = 5.5e-7
-    rotor_span_m: float = 0.152
-    frontal_area_m2: float = 4.3e-3
-    air_density_kgpm3: float = 1.225
-    drag_coefficient: float = 1.0
-    rotor_inertia_kgm2: float = 4.0e-6
-    rotor_lag_s: float = 0.02
-    min_rotor_speed_radps: float = 60.0
-    max_rotor_speed_radps: float = 400.0
-    tilt_gain_per_s: float = 8.0
-    yaw_gain_per_s: float = 2.0
-    tilt_rate_gain_per_s: float = 20.0
-    yaw_rate_gain_per_s: float = 6.0
-    rate_margin: float = 0.05
-    substeps: int = 2
-    length_m: float = 0.32
-    width_m: float = 0.32
-    height_m: float = 0.12
-    max_speed_mps: float = 2.5
-    max_acceleration_mps2: float = 2.5
-    max_body_rate_radps: float = 2.0
+    mass_kg: Positive = 0.75  # kg; paper 4
+    inertia_x_kgm2: Positive = 0.015  # kg m^2, about body x (roll); paper 4
+    inertia_y_kgm2: Positive = 0.015  # kg m^2, about body y (pitch); paper 4
+    inertia_z_kgm2: Positive = 0.024  # kg m^2, about body z (yaw); paper 4
+    thrust_coefficient_Ns2: Positive = 3.3e-5  # N s^2, C_T in F = C_T w^2 of one rotor; paper 4
+    torque_coefficient_Nms2: Positive = 5.5e-7  # N m s^2, C_D in M = C_D w^2 of one rotor; paper 4
+    rotor_span_m: Positive = 0.152  # m, 2L, between opposite rotors; paper 4
+    frontal_area_m2: NonNegative = 4.3e-3  # m^2, in the drag law; paper 4
+    air_density_kgpm3: NonNegative = 1.225  # kg/m^3, sea level, 15 degrees C [ours]
+    drag_coefficient: NonNegative = 1.0  # bluff body, the same from all sides; 0: no drag [ours]
+    rotor_inertia_kgm2: NonNegative = 4.0e-6  # kg m^2, of one rotor and motor bell, 9 cm across; 0:
+    # no gyroscopic moment [ours]
+    rotor_lag_s: Positive = 0.02  # s, time constant of rotor speed; RotorS has 0.0125 up, 0.025 down [ours]
+    min_rotor_speed_radps: NonNegative = 60.0  # rad/s, idle; hover is 236 rad/s [ours]
+    max_rotor_speed_radps: Positive = 400.0  # rad/s, 2.9 times the weight [ours]
+    tilt_gain_per_s: Positive = 8.0  # 1/s, from tilt error to commanded rate [ours]
+    yaw_gain_per_s: Positive = 2.0  # 1/s, from yaw error to commanded rate [ours]
+    tilt_rate_gain_per_s: Positive = 20.0  # 1/s, from roll and pitch rate error to angular
+    # acceleration [ours]
+    yaw_rate_gain_per_s: Positive = 6.0  # 1/s, from yaw rate error to angular acceleration;
+    # the rotors give 5 rad/s^2 [ours]
+    rate_margin: Annotated[float, between(0, 0.5)] = 0.05  # share of the body rate limit left to the rate
+    # loop's overshoot (measured 0.033) [ours]
+    substeps: Annotated[int, between(1, 100)] = 2  # RK4 and attitude loop steps per simulation step [ours]
+    length_m: Positive = 0.32  # m, body box along x; paper 1
+    width_m: Positive = 0.32  # m, body box along y; paper 1
+    height_m: Positive = 0.12  # m, body box along z; paper 1
+    max_speed_mps: Positive = 2.5  # m/s; paper 1
+    max_acceleration_mps2: Positive = 2.5  # m/s^2 [ours]
+    max_body_rate_radps: Positive = 2.0  # rad/s, of each axis; paper 1 (axes [ours])
     _plant: Plant = field(init=False, repr=False)
     _loop: AttitudeLoop = field(init=False, repr=False)
     _x: Float = field(init=False, repr=False)
@@ -235,61 +240,31 @@ class Quadrotor:
     _work: Float = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Check every parameter and pack them for the kernels."""
-        require_positive(
+        hover = math.sqrt(self.mass_kg * GRAVITY_MPS2 / (4.0 * self.thrust_coefficient_Ns2))
+        require(
+            self.min_rotor_speed_radps < hover < self.max_rotor_speed_radps,
+            f"rotor speeds must span the hover speed of {hover:.1f} rad/s, got min_rotor_speed_radps "
+            f"{self.min_rotor_speed_radps} and max_rotor_speed_radps {self.max_rotor_speed_radps}",
+        )
+        self._plant = Plant(
             mass_kg=self.mass_kg,
             inertia_x_kgm2=self.inertia_x_kgm2,
             inertia_y_kgm2=self.inertia_y_kgm2,
             inertia_z_kgm2=self.inertia_z_kgm2,
-            thrust_coefficient_Ns2=self.thrust_coefficient_Ns2,
-            torque_coefficient_Nms2=self.torque_coefficient_Nms2,
-            rotor_span_m=self.rotor_span_m,
+            thrust_coefficient=self.thrust_coefficient_Ns2,
+            torque_coefficient=self.torque_coefficient_Nms2,
+            lever_m=0.5 * self.rotor_span_m / math.sqrt(2.0),
+            drag_kgpm=0.5 * self.air_density_kgpm3 * self.drag_coefficient * self.frontal_area_m2,
+            rotor_inertia_kgm2=self.rotor_inertia_kgm2,
             rotor_lag_s=self.rotor_lag_s,
+            min_rotor_speed_radps=self.min_rotor_speed_radps,
+            max_rotor_speed_radps=self.max_rotor_speed_radps,
+        )
+        self._loop = AttitudeLoop(
             tilt_gain_per_s=self.tilt_gain_per_s,
             yaw_gain_per_s=self.yaw_gain_per_s,
             tilt_rate_gain_per_s=self.tilt_rate_gain_per_s,
             yaw_rate_gain_per_s=self.yaw_rate_gain_per_s,
-            length_m=self.length_m,
-            width_m=self.width_m,
-            height_m=self.height_m,
-            max_speed_mps=self.max_speed_mps,
-            max_acceleration_mps2=self.max_acceleration_mps2,
-            max_body_rate_radps=self.max_body_rate_radps,
-        )
-        require_non_negative(
-            frontal_area_m2=self.frontal_area_m2,
-            air_density_kgpm3=self.air_density_kgpm3,
-            drag_coefficient=self.drag_coefficient,
-            rotor_inertia_kgm2=self.rotor_inertia_kgm2,
-            min_rotor_speed_radps=self.min_rotor_speed_radps,
-        )
-        hover = math.sqrt(self.mass_kg * GRAVITY_MPS2 / (4.0 * self.thrust_coefficient_Ns2))
-        require(
-            self.min_rotor_speed_radps < hover < self.max_rotor_speed_radps < math.inf,
-            f"rotor speeds must span the hover speed of {hover:.1f} rad/s, got min_rotor_speed_radps "
-            f"{self.min_rotor_speed_radps} and max_rotor_speed_radps {self.max_rotor_speed_radps}",
-        )
-        require(0.0 <= self.rate_margin <= 0.5, f"rate_margin must be 0 to 0.5, got {self.rate_margin}")
-        require(1 <= self.substeps <= 100, f"substeps must be 1 to 100, got {self.substeps}")
-        self._plant = Plant(
-            mass_kg=float(self.mass_kg),
-            inertia_x_kgm2=float(self.inertia_x_kgm2),
-            inertia_y_kgm2=float(self.inertia_y_kgm2),
-            inertia_z_kgm2=float(self.inertia_z_kgm2),
-            thrust_coefficient=float(self.thrust_coefficient_Ns2),
-            torque_coefficient=float(self.torque_coefficient_Nms2),
-            lever_m=0.5 * self.rotor_span_m / math.sqrt(2.0),
-            drag_kgpm=0.5 * self.air_density_kgpm3 * self.drag_coefficient * self.frontal_area_m2,
-            rotor_inertia_kgm2=float(self.rotor_inertia_kgm2),
-            rotor_lag_s=float(self.rotor_lag_s),
-            min_rotor_speed_radps=float(self.min_rotor_speed_radps),
-            max_rotor_speed_radps=float(self.max_rotor_speed_radps),
-        )
-        self._loop = AttitudeLoop(
-            tilt_gain_per_s=float(self.tilt_gain_per_s),
-            yaw_gain_per_s=float(self.yaw_gain_per_s),
-            tilt_rate_gain_per_s=float(self.tilt_rate_gain_per_s),
-            yaw_rate_gain_per_s=float(self.yaw_rate_gain_per_s),
             max_body_rate_radps=(1.0 - self.rate_margin) * self.max_body_rate_radps,
         )
 

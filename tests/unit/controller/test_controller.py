@@ -169,7 +169,7 @@ def test_tilt_stays_within_its_limit():
 
 
 def test_refuses_a_tilt_limit_that_cannot_lift():
-    with pytest.raises(ConfigError, match=r"max_tilt_rad must be <= 1.2 rad, got 1.5"):
+    with pytest.raises(ConfigError, match=r"max_tilt_rad must be > 0 and <= 1.2, got 1.5"):
         PositionVelocity(max_tilt_rad=1.5)
 
 

@@ -1,0 +1,105 @@
+"""`make conf`: the yaml of every option, made from the fields of its class and their comments.
+
+A parameter's comment begins behind its default and may go on in the lines below:
+
+    margin_m: NonNegative = 0.03  # m, the path counts as blocked when its clearance is below
+    # body radius + this [ours]
+
+`python -m uavexp.config.generate MODULE.CLASS` prints the yaml of an option of your own.
+"""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import importlib
+import inspect
+import io
+import sys
+import textwrap
+import tokenize
+from pathlib import Path
+from typing import Any
+
+import yaml  # type: ignore[import-untyped]
+
+from uavexp.config.build import GROUPS, TARGET, component_class
+from uavexp.parameters import MISSING, Unknown, is_option, parameter_types, plain
+from uavexp.paths import PACKAGE, conf_folder
+
+
+def option_files() -> dict[Path, str]:
+    """Path and text of the yaml of every option of the package."""
+    classes = [cls for group in GROUPS for cls in _options(group)]
+    return {_place(cls): option_yaml(cls) for cls in classes}
+
+
+def option_yaml(cls: type) -> str:
+    """The yaml of one option: its class, and a line for each parameter."""
+    target = f"{TARGET}: {cls.__module__}.{cls.__name__}"
+    return "\n".join([*_defaults_list(cls), target, *parameter_lines(cls)]) + "\n"
+
+
+def parameter_lines(cls: type) -> list[str]:
+    """`name: default  # comment` of every parameter of a dataclass."""
+    bases = [base for base in reversed(cls.__mro__) if dataclasses.is_dataclass(base)]
+    said = {name: text for base in bases for name, text in _comments(base).items() if text}
+    fields = [item for item in dataclasses.fields(cls) if item.init]
+    return [f"{item.name}: {_default(cls, item)}  # {said.get(item.name, '')}".rstrip() for item in fields]
+
+
+def _defaults_list(cls: type) -> list[str]:
+    """What an option brings with it: its class's `defaults_list` with the comment there."""
+    items: tuple[str, ...] = getattr(cls, "defaults_list", ())
+    head = [f"# {_comments(cls)['defaults_list']}", "defaults:"] if items else []
+    return head + [f"  - {item}" for item in items]
+
+
+def _default(cls: type, item: dataclasses.Field[Any]) -> str:
+    if parameter_types(cls)[item.name] is Unknown:
+        return "${unknown}"  # the trial's
+    if item.default_factory is not dataclasses.MISSING:
+        return _scalar(item.default_factory())
+    return MISSING if item.default is dataclasses.MISSING else _scalar(item.default)
+
+
+def _scalar(value: Any) -> str:
+    text: str = yaml.safe_dump(plain(value), default_flow_style=True, width=1_000_000, allow_unicode=True)
+    return text.removesuffix("\n...\n").strip()
+
+
+def _comments(cls: type) -> dict[str, str]:
+    """Comment of every field in a class's source: behind it, and in whole lines after it."""
+    source = textwrap.dedent(inspect.getsource(cls))
+    tokens = tokenize.generate_tokens(io.StringIO(source).readline)
+    comments = {at[0]: text.lstrip("# ") for kind, text, at, *_ in tokens if kind == tokenize.COMMENT}
+    body = ast.parse(source).body[0].body  # type: ignore[attr-defined]
+    ends = [node.lineno for node in body[1:]] + [sys.maxsize]
+    return {
+        node.target.id: " ".join(comments[line] for line in sorted(comments) if node.lineno <= line < end)
+        for node, end in zip(body, ends, strict=True)
+        if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name)
+    }
+
+
+def _options(group: str) -> list[type]:
+    names = [f"uavexp.{group}.{file.stem}" for file in sorted((PACKAGE / group).glob("*.py"))]
+    modules = [importlib.import_module(name) for name in names]
+    return [
+        item
+        for module in modules
+        for item in vars(module).values()
+        if is_option(item) and item.__module__ == module.__name__
+    ]
+
+
+def _place(cls: type) -> Path:
+    _, group, name = cls.__module__.split(".")
+    return conf_folder() / group / f"{name}.yaml"
+
+
+if __name__ == "__main__":
+    for target in sys.argv[1:]:
+        sys.stdout.write(option_yaml(component_class("", target)))
+    for path, text in option_files().items() if not sys.argv[1:] else ():
+        path.write_text(text, encoding="utf-8")
