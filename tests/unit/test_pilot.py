@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.unit.test_trigger import LIMITS, change, observe
 
+from tests.unit.trigger.test_trigger import LIMITS, change, observe
 from uavexp.braking import stopping_distance_m, with_stop
 from uavexp.check.fields import box, empty, field_from
 from uavexp.explorer.target_only import TargetOnly

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.unit.test_inspect_mission import begun, seen_at, state
-from tests.unit.test_trigger import LIMITS
 
 from tests.inspections import START_M, building
+from tests.unit.mission.test_inspect_mission import begun, seen_at, state
+from tests.unit.trigger.test_trigger import LIMITS
 from uavexp.arrays import Float
 from uavexp.mission import give_way
 from uavexp.planner.movers.moving import turns_s

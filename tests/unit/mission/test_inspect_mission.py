@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.unit.test_trigger import LIMITS, change, observe
 
 from tests.inspections import START_M, building
 from tests.logs import make_world
+from tests.unit.trigger.test_trigger import LIMITS, change, observe
 from uavexp.config.composition import Composer
 from uavexp.config.overrides import parse_settings
 from uavexp.errors import ConfigError, WorldError

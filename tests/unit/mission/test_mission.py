@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.unit.test_trigger import LIMITS, change, goal_at, observe, room
 
+from tests.unit.trigger.test_trigger import LIMITS, change, goal_at, observe, room
 from uavexp.field import DistanceField
 from uavexp.mission.explore import Explore
 from uavexp.mission.goto import Goto

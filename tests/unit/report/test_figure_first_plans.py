@@ -6,10 +6,10 @@ import dataclasses
 
 import numpy as np
 import pytest
-from tests.unit.test_df_bitstar import plan
-from tests.unit.test_metrics_plan import cubic
 
 from tests.logs import make_log, make_world, still_curve
+from tests.unit.metrics.test_metrics_plan import cubic
+from tests.unit.planner.find.tree.test_tree import plan
 from uavexp.report.figures.flown import SharedWorld
 from uavexp.report.figures.looks import Look
 from uavexp.report.figures.plans import first_plans

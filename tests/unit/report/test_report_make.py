@@ -13,9 +13,9 @@ import pandas as pd
 import pyarrow as pa
 import pytest
 from pyarrow import parquet
-from tests.unit.test_report_tables import BAD, GOOD, WORST, trials_of
 
 from tests.studies import copy_of, flown  # noqa: F401
+from tests.unit.report.test_report_tables import BAD, GOOD, WORST, trials_of
 from uavexp.errors import RecordError
 from uavexp.report import make
 from uavexp.report.__main__ import main

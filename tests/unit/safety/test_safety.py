@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.unit.test_trigger import LIMITS, STRAIGHT, change, observe
 
+from tests.unit.trigger.test_trigger import LIMITS, STRAIGHT, change, observe
 from uavexp.braking import stopping_distance_m
 from uavexp.check.fields import box, empty, field_from
 from uavexp.field import UNKNOWN, DistanceField

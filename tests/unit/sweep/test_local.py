@@ -114,7 +114,7 @@ def test_who_stops_listening_leaves_no_child(n_jobs: int, tmp_path: Path) -> Non
 @pytest.mark.parametrize("deed", ["note_and_sleep", "note_and_spin"])
 def test_children_die_with_a_supervisor_that_is_killed(deed: str, tmp_path: Path) -> None:
     code = (
-        "import sys; from pathlib import Path; from tests.unit.test_sweep_local import *; "
+        "import sys; from pathlib import Path; from tests.unit.sweep.test_local import *; "
         f"run(jobs(*[({deed!r}, Path(sys.argv[1]))] * 4))"
     )
     variables = {**os.environ, "PYTHONPATH": str(PACKAGE.parent)}
@@ -131,7 +131,7 @@ def test_children_die_with_a_supervisor_that_is_killed(deed: str, tmp_path: Path
 _INTERRUPTED = """
 import os, signal, time
 from multiprocessing import forkserver
-from tests.unit.test_sweep_local import *
+from tests.unit.sweep.test_local import *
 
 def connect(fds):
     pair = _connect(fds)

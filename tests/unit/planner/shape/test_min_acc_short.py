@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.unit.test_trigger import LIMITS
 
+from tests.unit.trigger.test_trigger import LIMITS
 from uavexp.check.fields import bounds, empty, field_from
 from uavexp.planner.min_acc import MinAcc
 from uavexp.trajectory import evaluate

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.unit.test_trigger import LIMITS
 
+from tests.unit.trigger.test_trigger import LIMITS
 from uavexp.planner.shape.waypoint_spline import WaypointSpline, passing_times_s
 from uavexp.trajectory import evaluate, sample_times
 from uavexp.types import Goal, PlanRequest, PlanStatus
