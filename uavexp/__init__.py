@@ -34,20 +34,7 @@ os.environ[VARIABLE] = LOCATOR
 
 
 def fly(*overrides: str, **values: Any) -> Trial:
-    """Fly one trial and return it; nothing is written to disk.
+    """Fly one trial and return it (`uavexp.flight.fly`), e.g. `fly(strategy="mcr", seed=0)`."""
+    from uavexp import flight
 
-    Args:
-        overrides: as on the command line, e.g. `"trigger.delta_map_m=0.1"`.
-        values: the same as keywords, e.g. `strategy="mcr", seed=0`; keys with a dot go
-            through `**{"world.size_m": [12, 8, 3]}`.
-
-    Returns:
-        The trial: configuration, world, log and metrics.
-
-    Raises:
-        ConfigError: a wrong key or value, or more than one cell or seed.
-        WorldError: the world cannot be made or read.
-    """
-    from uavexp.flight import fly_overrides
-
-    return fly_overrides(overrides, values)
+    return flight.fly(*overrides, **values)

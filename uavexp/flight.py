@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -39,6 +38,36 @@ class Trial:
         return repeat_command(self.cell, self.seed)
 
 
+def fly(*overrides: str, **values: Any) -> Trial:
+    """Fly one trial and return it; nothing is written to disk.
+
+    Args:
+        overrides: as on the command line, e.g. `"trigger.delta_map_m=0.1"`.
+        values: the same as keywords, e.g. `strategy="mcr", seed=0`; keys with a dot go
+            through `**{"world.size_m": [12, 8, 3]}`.
+
+    Returns:
+        The trial: configuration, world, log and metrics.
+
+    Raises:
+        ConfigError: a wrong key or value, or more than one cell or seed.
+        WorldError: the world cannot be made or read.
+    """
+    settings = [
+        *parse_settings(overrides),
+        *(setting for key, value in values.items() for setting in flatten(key, value)),
+    ]
+    command = Composer().command(settings)
+    if len(command.cells) != 1 or len(command.seeds) != 1:
+        raise ConfigError(
+            f"uavexp.fly flies one trial, not {len(command.cells)} cells and {len(command.seeds)} seeds; "
+            "grids are flown from the command line"
+        )
+    if command.out is not None:
+        raise ConfigError("uavexp.fly writes nothing: out has no place here")
+    return fly_cell(command.cells[0], command.seeds[0])
+
+
 def fly_cell(cell: Cell, seed: int, progress: Progress | None = None) -> Trial:
     """Build fresh components and fly one trial.
 
@@ -70,20 +99,3 @@ def repeat_command(cell: Cell, seed: int, user_folder: Path | None = None) -> st
     typed = [f"{'+' * setting.add}{setting.key}={render(setting.values[0])}" for setting in cell.settings]
     folder = ["--config-dir", str(user_folder)] if user_folder else []
     return shlex.join(["python", "-m", "uavexp", *folder, *typed, f"seed={seed}"])
-
-
-def fly_overrides(overrides: Sequence[str], values: Mapping[str, Any]) -> Trial:
-    """Compose one cell from overrides and keywords and fly it with one seed (`uavexp.fly`)."""
-    settings = [
-        *parse_settings(overrides),
-        *(setting for key, value in values.items() for setting in flatten(key, value)),
-    ]
-    command = Composer().command(settings)
-    if len(command.cells) != 1 or len(command.seeds) != 1:
-        raise ConfigError(
-            f"uavexp.fly flies one trial, not {len(command.cells)} cells and {len(command.seeds)} seeds; "
-            "grids are flown from the command line"
-        )
-    if command.out is not None:
-        raise ConfigError("uavexp.fly writes nothing: out has no place here")
-    return fly_cell(command.cells[0], command.seeds[0])

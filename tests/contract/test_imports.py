@@ -22,7 +22,11 @@ LAYERS = (
     {"recorder", "pilot", "trial"},
     {"config"},
     {"flight", "__init__"},
-    {"store", "report", "sweep", "cli", "check", "__main__"},
+    {"store", "check"},
+    {"report"},
+    {"sweep"},
+    {"cli"},
+    {"__main__"},
 )
 HYDRA = ("hydra", "omegaconf")
 

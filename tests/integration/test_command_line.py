@@ -42,7 +42,7 @@ def run(*typed: str, cwd: Path, **environment: str) -> subprocess.CompletedProce
 def somewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Every command runs in an empty folder."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("uavexp.store.folders.outputs_root", lambda: tmp_path / "outputs")
+    monkeypatch.setattr("uavexp.store.folder.outputs_root", lambda: tmp_path / "outputs")
     return tmp_path
 
 

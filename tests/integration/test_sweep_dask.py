@@ -16,8 +16,9 @@ from tests.jobs import act
 from tests.sweeps import QUICK, assert_same_study, run
 from uavexp.__main__ import main
 from uavexp.errors import ConfigError
+from uavexp.store.records import Status
 from uavexp.sweep.dask import differing_packages, run_dask, slurm_cluster
-from uavexp.sweep.job import Done, Job, Limits, Status
+from uavexp.sweep.job import Done, Job, Limits
 
 distributed = pytest.importorskip("distributed", reason="Dask is an extra: pip install 'uavexp[dask]'")
 LIMITS = Limits(timeout_s=60.0, memory_mb=1000.0)

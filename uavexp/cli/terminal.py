@@ -113,13 +113,20 @@ class Terminal:
         how = "the same command" if again else f"the same command with out={folder}"
         self.say(f"stopped: {flown} of {total} trials are kept in {folder}; {how} flies the others")
 
-    def summary(self, rows: Sequence[Row], plan: Plan) -> None:
-        """Print the tables of trials, how to repeat them, and their pictures.
+    def flown(self, plan: Plan, rows: Sequence[Row]) -> None:
+        """Print what has been flown; of an experiment, make and print the report; the folder last.
 
         Args:
-            rows: of `trials.parquet`.
             plan: what was asked; only its trials are shown.
+            rows: of `trials.parquet`.
         """
+        self._summary(plan, rows)
+        if plan.study.name:
+            self._report(plan.study.folder)
+        self.say(str(plan.study.folder))
+
+    def _summary(self, plan: Plan, rows: Sequence[Row]) -> None:
+        """Tables of trials, how to repeat them, and their pictures."""
         commands = {job.name: job.payload.command for job in plan.jobs}
         if pooled := pooled_versions((row["code"], row["lock"]) for row in rows):
             self.say(pooled)
@@ -137,8 +144,12 @@ class Terminal:
             if row["status"] == "ok":
                 self.say(f"picture: {plan.study.folder / TRIALS / row['trial'] / PICTURE}")
 
-    def files(self, paths: Sequence[Path], folder: Path) -> None:
-        """Print where a report's files are; tables and figures by their folder."""
+    def _report(self, folder: Path) -> None:
+        """Make the report, and print where its files are: tables and figures by their folder."""
+        from uavexp.report.make import make_report
+
+        self.say("writing the report ...")
+        paths = make_report(folder, self.say)
         for place in dict.fromkeys(path if path.parent == folder else path.parent for path in paths):
             self.say(f"report:  {place}")
 

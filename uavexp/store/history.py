@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import platform
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import uavexp
 from uavexp.paths import checkout_root
 from uavexp.store.records import canonical_json, write_text
 from uavexp.store.study import RUN, read_runs
-from uavexp.sweep.runner import Runner, cores
 
 FLYING = "flying, or killed"  # how a run ended, for as long as it has not said
 
@@ -23,7 +23,7 @@ class Run:
     """One time a command flies."""
 
     typed: Sequence[str]  # the command line
-    runner: Runner
+    how: Mapping[str, Any]  # it flies: backend, workers, machine
     began: datetime = field(default_factory=lambda: datetime.now(UTC))
 
     def note(self, folder: Path, ended: str, flown: int = 0, failed: int = 0) -> None:
@@ -45,12 +45,10 @@ class Run:
             "wall_s": (datetime.now(UTC) - self.began).total_seconds(),
             "flown": flown,
             "failed": failed,
-            "backend": self.runner.backend,
-            "n_jobs": self.runner.workers,
+            **self.how,
             "uavexp": uavexp.__version__,
             "commit": commit(),
             "python": platform.python_version(),
-            "machine": f"{platform.system()} {platform.machine()}, {cores()} cores",
         }
         others = [run for run in read_runs(folder) if run.get("began") != entry["began"]]
         write_text(folder / RUN, canonical_json({"runs": [*others, entry]}) + "\n")

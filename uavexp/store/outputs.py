@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-import io
 import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +15,7 @@ from uavexp.config.composition import Cell
 from uavexp.errors import ConfigError
 from uavexp.flight import Trial
 from uavexp.store.logs import arrays_digest, log_arrays, pack
-from uavexp.store.records import LOG, PICTURE, RECORD, WALL, canonical_json, seal
-from uavexp.sweep.job import Answer, Status
+from uavexp.store.records import LOG, PICTURE, RECORD, WALL, Status, canonical_json, seal
 from uavexp.types import Outcome, Replan
 
 _REPLAN = (
@@ -45,36 +44,36 @@ def identity(cell: Cell) -> dict[str, Any]:
     return {"strategy": cell.strategy, "options": cell.options, "config": {**config, **numbers}}
 
 
-def trial_files(trial: Trial, head: dict[str, Any], wall: dict[str, Any]) -> dict[str, bytes]:
+def trial_files(
+    trial: Trial, head: Mapping[str, Any], wall: Mapping[str, Any], picture: bytes
+) -> dict[str, bytes]:
     """Contents of the files of a flown trial.
 
     Args:
         trial: what was flown.
         head: its identity, code and lock digests.
         wall: clock times and the command, kept beside the record.
+        picture: of the flight, png.
     """
-    from uavexp.report.picture import draw
-
     arrays = log_arrays(trial.log)
-    shown = {**trial.metrics, "seed": trial.seed, "strategy": trial.cell.strategy}
-    picture = io.BytesIO()
-    draw(trial.world, trial.log, shown, wall["command"], picture)
     return {
         LOG: pack(arrays),
-        PICTURE: picture.getvalue(),
+        PICTURE: picture,
         WALL: _json({**wall, "laps": laps(trial)}),
         RECORD: seal({**head, **measured(trial), "log": arrays_digest(arrays)}).encode(),
     }
 
 
-def failure_files(answer: Answer, head: dict[str, Any], wall: dict[str, Any]) -> dict[str, bytes]:
+def failure_files(
+    status: Status, reason: str, trace: Sequence[str], head: Mapping[str, Any], wall: Mapping[str, Any]
+) -> dict[str, bytes]:
     """Contents of the files of a trial that did not run to its end: its reason and its traceback."""
     record = {
         **head,
-        "status": answer.status,
+        "status": status,
         "outcome": Outcome.ERROR,
-        "reason": answer.reason,
-        "traceback": answer.trace,
+        "reason": reason,
+        "traceback": trace,
         "metrics": {},
     }
     return {WALL: _json(wall), RECORD: seal(record).encode()}

@@ -16,7 +16,7 @@ import os
 import re
 import tempfile
 from collections.abc import Callable, Mapping
-from enum import Enum
+from enum import Enum, StrEnum
 from pathlib import Path
 from typing import IO, Any
 
@@ -28,6 +28,16 @@ from uavexp.paths import PACKAGE, checkout_root
 SCHEMA = 2
 RECORD, WALL, LOG, PICTURE = "record.json", "wall.json", "log.npz", "picture.png"
 _ASKING = ("cli", "sweep", "report")  # they ask for flights, run them and show them
+
+
+class Status(StrEnum):
+    """Whether a trial ran to its end. How the flight ended is its outcome, not its status."""
+
+    OK = "ok"
+    RAISED = "raised"  # an exception
+    KILLED = "killed"  # its process died: a signal, a segmentation fault
+    HUNG = "hung"  # ended after its time limit
+    MEMORY = "memory"  # asked for more than its memory limit
 
 
 class OtherVersionError(RecordError):

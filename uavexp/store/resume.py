@@ -12,9 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from uavexp.errors import RecordError
-from uavexp.store.records import LOG, OtherVersionError, read_record, trial_name
+from uavexp.store.records import LOG, OtherVersionError, Status, read_record, trial_name
 from uavexp.store.study import Study, StudyCell, read_runs, trial_folders
-from uavexp.sweep.job import Status
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,8 +16,9 @@ from multiprocessing.reduction import recv_handle
 from pathlib import Path
 from typing import Any
 
+from uavexp.store.records import Status
 from uavexp.sweep.faults import failure
-from uavexp.sweep.job import Answer, Call, Status
+from uavexp.sweep.job import Answer, Call
 
 _PR_SET_PDEATHSIG = 1
 _SIZE = Path("/proc/self/statm")

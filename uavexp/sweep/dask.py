@@ -20,8 +20,9 @@ from functools import partial
 from typing import Any
 
 from uavexp.errors import ConfigError, UavexpError
+from uavexp.store.records import Status
 from uavexp.sweep.faults import failure
-from uavexp.sweep.job import Answer, Call, Done, Job, Limits, Status
+from uavexp.sweep.job import Answer, Call, Done, Job, Limits
 from uavexp.sweep.local import run_local, start_fork_server
 
 _ALLOWED_FAILURES = 1  # workers that one job may take down beyond the first

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from uavexp.errors import UavexpError, one_line
 from uavexp.paths import PACKAGE
-from uavexp.sweep.job import Answer, Status
+from uavexp.store.records import Status
+from uavexp.sweep.job import Answer
 
 _DUMPED = re.compile(r'^\s*File "(?P<file>[^"]+)", line (?P<line>\d+) in (?P<name>.+)$', re.MULTILINE)
 _OUT_OF_MEMORY = ("std::bad_alloc", "MemoryError")

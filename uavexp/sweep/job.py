@@ -4,23 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import Any
 
 from uavexp.errors import require_positive
+from uavexp.store.records import Status
 
 Progress = Callable[[float, str], None]  # simulated time s, a few words
 Call = Callable[[Any, Progress], Any]  # payload in, picklable value out; importable by name
-
-
-class Status(StrEnum):
-    """Whether a job ran to its end. How the flight ended is its outcome, not its status."""
-
-    OK = "ok"
-    RAISED = "raised"  # an exception
-    KILLED = "killed"  # its process died: a signal, a segmentation fault
-    HUNG = "hung"  # ended after its time limit
-    MEMORY = "memory"  # asked for more than its memory limit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -25,9 +25,10 @@ from multiprocessing.context import ForkServerProcess
 from multiprocessing.reduction import send_handle
 from typing import IO
 
+from uavexp.store.records import Status
 from uavexp.sweep.child import run_child
 from uavexp.sweep.faults import death
-from uavexp.sweep.job import Answer, Call, Done, Job, Limits, Status
+from uavexp.sweep.job import Answer, Call, Done, Job, Limits
 
 Watch = Callable[[Job, float, str], None]  # job, simulated time s, a few words
 

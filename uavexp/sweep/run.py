@@ -10,20 +10,19 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from uavexp.cli.terminal import Terminal
 from uavexp.config.composition import Command
 from uavexp.errors import ConfigError, RecordError, UavexpError, one_line
 from uavexp.flight import check_world, fly_cell
-from uavexp.store.folders import folder_of, opened
+from uavexp.store.folder import folder_of, opened, put_trial, put_world, remove_unfinished, set_aside
 from uavexp.store.history import FLYING, Run
-from uavexp.store.records import write_text
+from uavexp.store.records import Status, write_text
 from uavexp.store.study import STUDY, collect, study_text
-from uavexp.store.writing import put_trial, put_world, remove_unfinished, set_aside
 from uavexp.sweep import kernels
+from uavexp.sweep.audience import Audience
 from uavexp.sweep.dask import run_dask
 from uavexp.sweep.faults import reason_of
 from uavexp.sweep.head_start import PRELOAD
-from uavexp.sweep.job import Done, Job, Status
+from uavexp.sweep.job import Done, Job
 from uavexp.sweep.local import Watch, run_local, start_fork_server
 from uavexp.sweep.plan import Plan, plan_of
 from uavexp.sweep.runner import Backend, Runner, read_runner
@@ -33,13 +32,13 @@ _WARM_UP_S = 3.0  # simulated: by then every kernel of a flight has been called
 
 
 def execute(
-    command: Command, terminal: Terminal, user_folder: Path | None = None, typed: Sequence[str] = ()
+    command: Command, audience: Audience, user_folder: Path | None = None, typed: Sequence[str] = ()
 ) -> int:
     """Fly a command's trials and leave their folder.
 
     Args:
         command: what to fly.
-        terminal: who is told.
+        audience: who is told.
         user_folder: of `--config-dir`.
         typed: the command line, for the folder's own record of it.
 
@@ -53,30 +52,30 @@ def execute(
     look = partial(plan_of, command, user_folder=user_folder, accept_other_code=runner.accept_other_code)
     if runner.dry_run:
         folder = folder_of(command)
-        terminal.listing(look(folder), folder)
+        audience.listing(look(folder), folder)
         return 0
     with opened(command) as folder:
         plan = look(folder)
         if plan.left:
-            _prepare(plan, runner, terminal)
-        return _fly_plan(plan, command, terminal, Run(typed=typed, runner=runner))
+            _prepare(plan, runner, audience)
+        return _fly_plan(plan, command, audience, Run(typed=typed, how=runner.how), runner)
 
 
-def _prepare(plan: Plan, runner: Runner, terminal: Terminal) -> None:
+def _prepare(plan: Plan, runner: Runner, audience: Audience) -> None:
     """Have kernels compiled and the fork server started."""
     if not kernels.is_compiled():
-        terminal.say("first run: compiling kernels takes about a minute")
+        audience.say("first run: compiling kernels takes about a minute")
         _compile_kernels(plan.left[0])
     if runner.backend == Backend.LOCAL:
         start_fork_server([PRELOAD])
 
 
-def _fly_plan(plan: Plan, command: Command, terminal: Terminal, run: Run) -> int:
+def _fly_plan(plan: Plan, command: Command, audience: Audience, run: Run, runner: Runner) -> int:
     folder, kept, failed = plan.study.folder, 0, 0
     with (
-        terminal.progress(plan),
+        audience.progress(plan),
         _worlds_checked(plan) as wait_for_worlds,
-        contextlib.closing(_fly(plan, run.runner, terminal.watch)) as flying,
+        contextlib.closing(_fly(plan, runner, audience.watch)) as flying,
     ):
         try:
             for done in flying:
@@ -87,25 +86,19 @@ def _fly_plan(plan: Plan, command: Command, terminal: Terminal, run: Run) -> int
                 _keep(folder, done)
                 kept += 1
                 failed += done.answer.status is not Status.OK
-                terminal.finished(done)
+                audience.finished(done)
         except (KeyboardInterrupt, UavexpError) as error:
             with contextlib.suppress(RecordError):
                 if (folder / STUDY).exists():
                     run.note(folder, _ending(error, folder), kept, failed)
                     collect(folder)
-            terminal.stopped(folder, kept, len(plan.left), again=bool(command.out or command.experiment))
+            audience.stopped(folder, kept, len(plan.left), again=bool(command.out or command.experiment))
             raise
     if not plan.left:
         _begin(plan, run)
     rows = collect(folder)
     run.note(folder, "finished", kept, failed)
-    terminal.summary(rows, plan)
-    if command.experiment is not None:
-        from uavexp.report.make import make_report
-
-        terminal.say("writing the report ...")
-        terminal.files(make_report(folder, terminal.say), folder)
-    terminal.say(str(folder))
+    audience.flown(plan, rows)
     return 1 if failed else 0
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import platform
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
@@ -64,6 +65,12 @@ class Runner:
     def limits(self) -> Limits:
         """What one trial may take."""
         return Limits(timeout_s=self.timeout_s, memory_mb=self.memory_mb)
+
+    @property
+    def how(self) -> dict[str, Any]:
+        """What a study's history tells of it."""
+        machine = f"{platform.system()} {platform.machine()}, {cores()} cores"
+        return {"backend": self.backend, "n_jobs": self.workers, "machine": machine}
 
 
 def read_runner(tree: Mapping[str, Any]) -> Runner:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import Any
 
 from uavexp.config.composition import Cell
 from uavexp.errors import RecordError
-from uavexp.flight import fly_cell
+from uavexp.flight import Trial, fly_cell
 from uavexp.store.outputs import failure_files, trial_files
 from uavexp.store.records import code_digest, lock_digest
 from uavexp.store.worlds import is_whole, world_bytes
@@ -47,12 +48,21 @@ def fly_task(task: Task, progress: Progress) -> Flown:
     digest = trial.world.digest
     known = is_whole(task.worlds / f"{digest}.npz")
     return Flown(
-        files=trial_files(trial, {**task.identity, **task.version}, wall),
+        files=trial_files(trial, {**task.identity, **task.version}, wall, _picture(trial, task.command)),
         world=(digest, None if known else world_bytes(trial.world)),
         outcome=str(trial.log.outcome),
         success=bool(trial.metrics["success"]),
         reason=trial.log.reason,
     )
+
+
+def _picture(trial: Trial, command: str) -> bytes:
+    from uavexp.report.picture import draw  # matplotlib, of which the supervisor has no need
+
+    shown = {**trial.metrics, "seed": trial.seed, "strategy": trial.cell.strategy}
+    picture = io.BytesIO()
+    draw(trial.world, trial.log, shown, command, picture)
+    return picture.getvalue()
 
 
 def version() -> dict[str, Any]:
@@ -77,4 +87,5 @@ def files_of(job: Job, answer: Answer, wall_s: float) -> dict[str, bytes]:
         return answer.value.files
     task: Task = job.payload
     wall = {"command": task.command, "wall_trial_s": wall_s}
-    return failure_files(answer, {**task.identity, **task.version}, wall)
+    head = {**task.identity, **task.version}
+    return failure_files(answer.status, answer.reason, answer.trace, head, wall)

@@ -16,7 +16,8 @@ import pytest
 from tests.jobs import act
 from uavexp.errors import ConfigError
 from uavexp.paths import PACKAGE
-from uavexp.sweep.job import Done, Job, Limits, Status
+from uavexp.store.records import Status
+from uavexp.sweep.job import Done, Job, Limits
 from uavexp.sweep.local import run_local, start_fork_server
 
 LIMITS = Limits(timeout_s=60.0, memory_mb=1000.0)

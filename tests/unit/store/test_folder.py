@@ -14,10 +14,9 @@ import pytest
 
 from uavexp.config.composition import Composer
 from uavexp.errors import RecordError
-from uavexp.store.folders import opened
+from uavexp.store.folder import LOCK, locked, opened, put_trial, put_world, remove_unfinished, set_aside
 from uavexp.store.resume import join_studies
 from uavexp.store.study import Study, StudyCell, read_study, study_text, trial_folders
-from uavexp.store.writing import LOCK, locked, put_trial, put_world, remove_unfinished, set_aside
 
 
 def study(folder: Path, cells: str, seeds: tuple[int, ...], name: str = "mcr/table1") -> Study:
@@ -133,7 +132,7 @@ def test_commands_that_begin_together_get_folders_of_their_own(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Used to share a number when both looked before either had made its folder."""
-    monkeypatch.setattr("uavexp.store.folders.outputs_root", lambda: tmp_path / "outputs")
+    monkeypatch.setattr("uavexp.store.folder.outputs_root", lambda: tmp_path / "outputs")
     command = Composer().command([])
     together = threading.Barrier(8)
 

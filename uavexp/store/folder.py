@@ -1,21 +1,108 @@
-"""A study folder while it is written: one writer, trials that are there whole or not at all."""
+"""A command's folder while it is written: which one, one writer, trials there whole or not at all."""
 
 from __future__ import annotations
 
 import contextlib
 import fcntl
 import os
+import re
 import shutil
+import tempfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import IO
 
-from uavexp.errors import RecordError
+from uavexp.config.composition import Command
+from uavexp.errors import ConfigError, RecordError
+from uavexp.paths import outputs_root
 from uavexp.store.records import write_bytes
-from uavexp.store.study import ASIDE, TRIALS, WORLDS
+from uavexp.store.study import ASIDE, STUDY, TRIALS, WORLDS
+from uavexp.store.table import TABLE
 
 LOCK = ".lock"
 _PART = ".part"
+
+
+def folder_of(command: Command) -> Path:
+    """Folder of a command: as typed, the experiment's own, or a new numbered one.
+
+    Raises:
+        ConfigError: it holds something else than a study.
+    """
+    if command.out is not None:
+        folder = Path(command.out).expanduser().absolute()
+    elif command.experiment is not None:
+        folder = outputs_root() / command.experiment.name
+    else:
+        folder = _next_folder(outputs_root(), _prefix(command))
+    if (folder / TABLE).exists() and not (folder / STUDY).exists():
+        raise ConfigError(
+            f"{folder} holds the trials of an earlier command; name another folder with out=DIR"
+        )
+    return folder
+
+
+@contextlib.contextmanager
+def opened(command: Command) -> Iterator[Path]:
+    """Make a command's folder and hold its lock; if no trial came of it, what was made is removed again.
+
+    Raises:
+        ConfigError: it holds something else than a study, or cannot be written.
+        RecordError: another command is flying into it.
+    """
+    made: list[Path] = []
+    try:
+        folder = _make(command, made)
+        with locked(folder):
+            try:
+                yield folder
+            finally:
+                if not (folder / STUDY).exists():
+                    (folder / LOCK).unlink(missing_ok=True)
+    finally:
+        for path in made:
+            with contextlib.suppress(OSError):
+                path.rmdir()  # only an empty one
+
+
+def _make(command: Command, made: list[Path]) -> Path:
+    """Make the folder of a command; a numbered one is new, also when another command takes its number.
+
+    Args:
+        command: whose folder.
+        made: takes the folders that were not there before, the inmost first.
+    """
+    numbered = command.out is None and command.experiment is None
+    while True:
+        folder = folder_of(command)
+        made[:] = [
+            path for path in (folder / TRIALS, folder / WORLDS, folder, *folder.parents) if not path.exists()
+        ]
+        try:
+            folder.mkdir(parents=True, exist_ok=not numbered)
+            tempfile.TemporaryFile(dir=folder).close()
+        except FileExistsError as error:
+            if not numbered:
+                raise _unwritable(folder, error) from error
+        except OSError as error:
+            raise _unwritable(folder, error) from error
+        else:
+            return folder
+
+
+def _unwritable(folder: Path, error: OSError) -> ConfigError:
+    return ConfigError(f"cannot write to the output folder {folder} ({error.strerror}); use out=DIR")
+
+
+def _prefix(command: Command) -> str:
+    names = dict.fromkeys(cell.strategy for cell in command.cells)
+    worlds = dict.fromkeys(cell.options["world"] for cell in command.cells)
+    return "-".join([*names, *worlds])[:60]
+
+
+def _next_folder(root: Path, prefix: str) -> Path:
+    numbers = [int(match[1]) for item in root.glob("*") if (match := re.match(r"(\d+)-", item.name))]
+    return root / f"{max(numbers, default=0) + 1:04d}-{prefix}"
 
 
 @contextlib.contextmanager
@@ -35,8 +122,8 @@ def locked(folder: Path) -> Iterator[None]:
 def _lock_file(folder: Path) -> IO[str]:
     """The folder's lock file, open and locked.
 
-    Who leaves an empty folder removes the file while holding it (`uavexp.store.folders`), so a
-    lock counts only when the file that was locked is still the one of that name.
+    Who leaves an empty folder removes the file while holding it (`opened`), so a lock counts only when
+    the file that was locked is still the one of that name.
     """
     while True:
         try:
