@@ -11,8 +11,8 @@ from uavexp.errors import WorldError
 from uavexp.geometry import polyline_length_m
 from uavexp.scene import Scene
 from uavexp.types import World
-from uavexp.world import lattice
 from uavexp.world.file import File
+from uavexp.world.shortest import make_nodes, shortest_lattice_path
 
 MANIFEST = DATA / "MANIFEST.json"
 pytestmark = pytest.mark.skipif(not MANIFEST.is_file(), reason=f"no third-party worlds in {DATA}")
@@ -61,16 +61,8 @@ def test_lattice_optimum_equals_the_reference(item: dict[str, Any], pair: dict[s
     clearance, cell = pair["path_clearance_used_m"], item["grid_resolution_m"]
     scene = Scene(read(item, pair, clearance_m=0.2))
     bounds = np.array(item["flight_bounds"], dtype=float)
-    path = lattice.shortest_path(
-        scene.grid,
-        bounds[0],
-        cell,
-        lattice.shape_of(bounds, cell),
-        clearance,
-        clearance,
-        np.array(pair["start"]),
-        np.array(pair["goal"]),
-    )
+    nodes = make_nodes(scene.grid, bounds, cell, clearance)
+    path = shortest_lattice_path(nodes, clearance, np.array(pair["start"]), np.array(pair["goal"]))
     assert polyline_length_m(path) == pytest.approx(pair["grid26_shortest_m"], abs=1e-3)
 
 

@@ -1,7 +1,7 @@
 """The task in a world: whether start and target are joined, how far apart, how hard.
 
 Everything is measured on the true triangles. "Joined with a clearance" is proved, not
-sampled (`lattice`): a found path keeps the clearance all along, ends included.
+sampled (`shortest`): a found path keeps the clearance all along, ends included.
 """
 
 from __future__ import annotations
@@ -17,7 +17,14 @@ from uavexp.arrays import Float, Float32, Int32
 from uavexp.geometry import polyline_length_m
 from uavexp.scene import Scene
 from uavexp.types import Difficulty, World
-from uavexp.world import lattice
+from uavexp.world.shortest import (
+    empty_columns,
+    make_nodes,
+    passable_layer,
+    proof_radius_m,
+    shortest_lattice_path,
+)
+from uavexp.world.sight import skip_ahead, tighten
 
 CELL_M = 0.1  # spacing of the lattice on which the shortest path is exact
 FINE_CELL_M = 0.05  # tried where that one is too coarse for a building's passages
@@ -48,16 +55,14 @@ def shortest_path(
     Returns:
         The path, ends included; (0, 3) when the two are not joined.
     """
-    shape = lattice.shape_of(flight_bounds_m, cell_m)
-    radius = lattice.proof_radius_m(clearance_m, math.sqrt(3.0) * cell_m)
-    path: Float = lattice.shortest_path(
-        scene.grid, flight_bounds_m[0], cell_m, shape, radius, clearance_m, start_m, target_m
-    )
+    radius_m = proof_radius_m(clearance_m, math.sqrt(3.0) * cell_m)
+    nodes = make_nodes(scene.grid, flight_bounds_m, cell_m, radius_m)
+    path: Float = shortest_lattice_path(nodes, clearance_m, start_m, target_m)
     if path.shape[0] == 0:
         return path
-    path = lattice.skip_ahead(scene.grid, path, clearance_m)
+    path = skip_ahead(scene.grid, path, clearance_m)
     for _ in range(TIGHTEN_ROUNDS):
-        path = lattice.tighten(scene.grid, _knots(path), clearance_m)
+        path = tighten(scene.grid, _knots(path), clearance_m)
     return path
 
 
@@ -97,9 +102,8 @@ def free_layer(
         Points (N, 3), the number (N,) of each one's connected part from 0, and the parts'
         sizes in points.
     """
-    shape = lattice.shape_of(flight_bounds_m, LAYER_CELL_M)
-    radius = lattice.proof_radius_m(clearance_m, math.sqrt(2.0) * LAYER_CELL_M)
-    free = lattice.passable_layer(scene.grid, flight_bounds_m[0], LAYER_CELL_M, shape, height_m, radius)
+    radius_m = proof_radius_m(clearance_m, math.sqrt(2.0) * LAYER_CELL_M)
+    free = passable_layer(make_nodes(scene.grid, flight_bounds_m, LAYER_CELL_M, radius_m), height_m)
     labels = np.asarray(ndimage.label(free, structure=np.ones((3, 3)))[0], dtype=np.int32)
     index = np.argwhere(free)
     points = np.column_stack(
@@ -116,11 +120,11 @@ def clutter_density(scene: Scene, flight_bounds_m: Float, start_m: Float) -> flo
     columns join it with the start; so the inside of a closed solid counts as occupied,
     whether the mesh has an inside or not, and so does what lies behind a closed wall.
     """
-    shape = lattice.shape_of(flight_bounds_m, CELL_M)
+    nodes = make_nodes(scene.grid, flight_bounds_m, CELL_M)
     half = np.array([0.5 * CELL_M, 0.5 * CELL_M, 0.5 * BAND_M])
-    air = lattice.empty_columns(scene.grid, flight_bounds_m[0], CELL_M, shape, start_m[2], half)
+    air = empty_columns(nodes, float(start_m[2]), half)
     labels = ndimage.label(air)[0]
-    i, j = np.minimum(((start_m[:2] - flight_bounds_m[0, :2]) / CELL_M).astype(int), shape[:2] - 1)
+    i, j = np.minimum(((start_m[:2] - flight_bounds_m[0, :2]) / CELL_M).astype(int), nodes.shape[:2] - 1)
     return 1.0 - float(np.count_nonzero(labels == labels[i, j])) / air.size if air[i, j] else 1.0
 
 

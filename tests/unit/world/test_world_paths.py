@@ -9,8 +9,10 @@ from scipy.sparse.csgraph import dijkstra
 
 from uavexp.geometry import polyline_length_m
 from uavexp.scene import Scene
-from uavexp.world import lattice, task
+from uavexp.world import task
 from uavexp.world.boxes import Boxes
+from uavexp.world.shortest import make_nodes, shortest_lattice_path
+from uavexp.world.sight import in_sight
 
 BOUNDS = np.array([[0.0, 0.0, 0.0], [4.0, 3.0, 1.2]])
 
@@ -26,7 +28,7 @@ def cluttered(seed: int) -> Scene:
 
 def graph_shortest(scene: Scene, cell: float, radius: float, start: int, target: int) -> float:
     """Dijkstra of scipy on the 26-connected graph of nodes whose distance is at least `radius`."""
-    shape = lattice.shape_of(BOUNDS, cell)
+    shape = make_nodes(scene.grid, BOUNDS, cell).shape
     index = np.indices(shape).reshape(3, -1).T
     free = scene.distance_m(BOUNDS[0] + (index + 0.5) * cell) >= radius
     rows, columns, costs = [], [], []
@@ -50,11 +52,12 @@ def graph_shortest(scene: Scene, cell: float, radius: float, start: int, target:
 @pytest.mark.parametrize("seed", range(6))
 def test_lattice_path_is_as_short_as_scipys(seed: int) -> None:
     scene, cell, radius = cluttered(seed), 0.1, 0.15
-    shape = lattice.shape_of(BOUNDS, cell)
+    nodes = make_nodes(scene.grid, BOUNDS, cell, radius)
+    shape = nodes.shape
     ends = np.array([[0, 2, 4], [shape[0] - 1, shape[1] - 3, 7]])
     start, target = BOUNDS[0] + (ends + 0.5) * cell
     expected = graph_shortest(scene, cell, radius, *np.ravel_multi_index(ends.T, tuple(shape)))
-    path = lattice.shortest_path(scene.grid, BOUNDS[0], cell, shape, radius, radius, start, target)
+    path = shortest_lattice_path(nodes, radius, start, target)
     if np.isinf(expected):
         assert path.shape == (0, 3)
     else:
@@ -97,8 +100,8 @@ def test_sight_is_blocked_exactly_by_the_clearance() -> None:
     grid = Scene.from_mesh(*boxes.mesh()).grid
     for height, sees in ((0.2999, False), (0.302, True)):
         a, b = np.array([-1.0, height, 0.0]), np.array([4.0, height, 0.0])
-        assert lattice.in_sight(grid, a, b, 0.3) == sees
-        assert lattice.in_sight(grid, b, a, 0.3) == sees
+        assert in_sight(grid, a, b, 0.3) == sees
+        assert in_sight(grid, b, a, 0.3) == sees
 
 
 def test_bottleneck_is_half_the_gap_between_two_walls() -> None:
