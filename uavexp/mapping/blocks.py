@@ -7,7 +7,8 @@ from typing import Any
 import numba as nb
 import numpy as np
 
-from uavexp.arrays import Float32, Int32, UInt8
+from uavexp.arrays import Float32, Int32
+from uavexp.mapping.occupancy import Voxels
 from uavexp.o3d import open3d
 
 EDGE = 8  # voxels along a block
@@ -40,14 +41,14 @@ def blocks_of(touched: Int32, shape: tuple[int, int, int]) -> tuple[Int32, Int32
 
 @nb.njit(cache=True)
 def write_voxels(
-    touched: Int32, local: Int32, rows: Int32, tsdf: Float32, weight: UInt8, truncation_m: float,
+    touched: Int32, local: Int32, rows: Int32, voxels: Voxels, truncation_m: float,
     fused: Float32, weights: Float32,
 ) -> None:  # fmt: skip
     """Write fused voxels into Open3D's blocks; `local` of `blocks_of`, `rows` of `Blocks`."""
     for n in range(touched.shape[0]):
         row = rows[local[n, 0]]
-        fused[row, local[n, 1]] = tsdf[touched[n]] / truncation_m
-        weights[row, local[n, 1]] = weight[touched[n]]
+        fused[row, local[n, 1]] = voxels.tsdf_m[touched[n]] / truncation_m
+        weights[row, local[n, 1]] = voxels.weight[touched[n]]
 
 
 class Blocks:

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import numba as nb
 import numpy as np
 
-from uavexp.arrays import Float, Float32, Int32, UInt8
+from uavexp.arrays import Float, Float32
 from uavexp.field import DistanceField
 from uavexp.mapping.frustum import column_depths, frustum_box
-from uavexp.mapping.occupancy import OccupancyMap, Rule, enlist, judge, keeps_free
+from uavexp.mapping.occupancy import OccupancyMap, Rule, Voxels, observe, reciprocals
 from uavexp.mapping.parameters import MapParameters
 from uavexp.mapping.rays import integrate_rays
 from uavexp.scene import Scene
@@ -71,40 +71,32 @@ def _visible_part(
 
 @nb.njit(cache=True)
 def integrate_scan(
-    depth: Float32, intrinsics: Float, max_range_m: float, rotation: Float, position_m: Float,
-    origin_m: Float, voxel_m: float, shape: tuple[int, int, int], rule: Rule,
-    tsdf: Float32, weight: UInt8, live: UInt8, state: UInt8, changes: Int32, count: int,
+    voxels: Voxels, depth: Float32, intrinsics: Float, max_range_m: float, rotation: Float,
+    corner: Float, voxel_m: float, rule: Rule, count: int,
 ) -> int:  # fmt: skip
     """Fuse one depth image; returns how many voxels now stand in `changes`.
 
     Args:
+        voxels: of the map.
         depth: (H, W) along the optical axis, m; +inf is free to `max_range_m`, NaN nothing.
         intrinsics: (4,) fx, fy, cx, cy.
         max_range_m: of the sensor.
         rotation: (3, 3) camera to world.
-        position_m: (3,) of the camera.
-        origin_m: (3,) lower corner of the grid.
+        corner: (3,) the camera in voxels, counted from the centre of voxel (0, 0, 0).
         voxel_m: edge of a voxel.
-        shape: voxels along x, y, z.
         rule: fusion and occupancy.
-        tsdf: (N,) flat, as the four below: fused distance, m.
-        weight: of the fused distance.
-        live: state and evidence as of now.
-        state: as of the last publication.
-        changes: voxels whose live state has left the published one.
         count: how many of `changes` are in use.
     """
     height, width = depth.shape
-    nx, ny, nz = shape
+    nx, ny, nz = voxels.shape
     fx, fy = intrinsics[0], intrinsics[1]
     right, down = intrinsics[2] + 0.5, intrinsics[3] + 0.5  # pixel u spans [u, u + 1) with these
     range_m = max_range_m + rule.truncation_m
     farthest = column_depths(depth)
-    corner = (position_m - origin_m) / voxel_m - 0.5  # the camera in voxels, counted between centres
     box = frustum_box(intrinsics, height, width, range_m / voxel_m, rotation, corner)
     low_x, high_x = max(int(np.ceil(box[0, 0])), 0), min(int(np.floor(box[1, 0])), nx - 1)
     low_y, high_y = max(int(np.ceil(box[0, 1])), 0), min(int(np.floor(box[1, 1])), ny - 1)
-    reciprocal = 1.0 / np.arange(1, rule.max_weight + 2)
+    reciprocal = reciprocals(rule)
     # camera axes in metres a voxel; the image's two turned into pixels times depth
     forward = rotation[:, 2] * voxel_m
     rightward = rotation[:, 0] * (voxel_m * fx) + right * forward
@@ -131,16 +123,7 @@ def integrate_scan(
                 if not observed >= -rule.truncation_m or (depth_m > max_range_m and observed > 0.0):
                     continue
                 observed = min(observed, rule.truncation_m)
-                at = column + k
-                before, had, byte = tsdf[at], np.int64(weight[at]), np.int64(live[at])
-                if keeps_free(observed, before, had, byte, rule):
-                    continue
-                fused = (had * before + observed) * reciprocal[had]
-                tsdf[at] = fused
-                weight[at] = np.uint8(had + (had < rule.max_weight))
-                after = judge(observed, before, had, fused, byte, rule)
-                if after != byte:
-                    count = enlist(at, after, live, state, changes, count)
+                count = observe(voxels, column + k, observed, rule, reciprocal, count)
     return count
 
 
@@ -168,10 +151,10 @@ class Dense(MapParameters):
         if isinstance(scan, RayScan):
             integrate_rays(scan, grid, self.rule())
             return
+        corner = (scan.camera_position_m - grid.origin_m) / grid.voxel_size_m - 0.5
         grid.changed = integrate_scan(
-            scan.depth_m, np.array([*scan.focal_px, *scan.centre_px]), scan.max_range_m,
-            scan.camera_rotation, scan.camera_position_m, grid.origin_m, grid.voxel_size_m, grid.shape,
-            self.rule(), grid.tsdf_m, grid.weight, grid.live, grid.state, grid.changes, grid.changed,
+            grid.voxels, scan.depth_m, np.array([*scan.focal_px, *scan.centre_px]), scan.max_range_m,
+            scan.camera_rotation, corner, grid.voxel_size_m, self.rule(), grid.changed,
         )  # fmt: skip
 
     def update(self, time_s: float) -> MapUpdate:

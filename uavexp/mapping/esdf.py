@@ -30,16 +30,8 @@ import numpy as np
 
 from uavexp.arrays import Bool, Float32, Int32, UInt8
 from uavexp.errors import require
-from uavexp.mapping.esdf_kernels import (
-    Int16,
-    carry_x,
-    carry_y,
-    carry_z,
-    emit,
-    flag_columns,
-    list_changed,
-    mark_seen,
-)
+from uavexp.mapping.esdf_changes import emit, flag_columns, list_changed, mark_seen
+from uavexp.mapping.esdf_kernels import Int16, carry_x, carry_y, carry_z
 from uavexp.types import MapUpdate
 
 _LARGEST_CAP = 16_000  # sums of two capped squares must fit 16 bits

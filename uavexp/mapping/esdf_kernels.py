@@ -13,7 +13,7 @@ import numba as nb
 import numpy as np
 import numpy.typing as npt
 
-from uavexp.arrays import Float32, Int32, UInt8
+from uavexp.arrays import Int32, UInt8
 
 Int16 = npt.NDArray[np.int16]
 _OCCUPIED = 2  # `uavexp.mapping.base.OCCUPIED`; a literal so that the kernels compile it in
@@ -142,6 +142,30 @@ def carry_z(
 
 
 @nb.njit(cache=True)
+def _mark_raised(
+    h: Int16, peak: Int16, plane: int, low: int, high: int, source: int, rose: int, was: Int16, new: Int16,
+    marked: UInt8,
+) -> None:  # fmt: skip
+    """Mark the columns of a plane whose minimum may have been a raised entry of the column `source`."""
+    nz = was.shape[0]
+    for y in range(low, high):
+        offset = source - y
+        if marked[y] == 0 and offset * offset + rose <= peak[plane + y]:
+            here = h[(plane + y) * nz : (plane + y + 1) * nz]
+            if _any_equal_raised(here, was, new, offset * offset):
+                marked[y] = 1
+
+
+@nb.njit(cache=True)
+def _group(columns: Int32, first: int, count: int, plane: int, ny: int, apart: int) -> int:
+    """End of the group of listed columns from `first` on: in one plane, neighbours at most so far apart."""
+    last = first + 1
+    while last < count and columns[last] < plane + ny and columns[last] - columns[last - 1] <= apart:
+        last += 1
+    return last
+
+
+@nb.njit(cache=True)
 def carry_y(
     shape: tuple[int, int, int], cap: int, peak: Int16, g: Int16, h: Int16,
     count_in: int, columns_in: Int32, old_in: Int16, fell_in: Int32, rose_in: Int32,
@@ -162,14 +186,8 @@ def carry_y(
     first = 0
     while first < count_in:  # groups in one plane whose reaches do not meet
         x = columns_in[first] // ny
-        last = first
         plane = x * ny
-        while (
-            last < count_in
-            and columns_in[last] < plane + ny
-            and (last == first or columns_in[last] - columns_in[last - 1] <= 2 * widest)
-        ):
-            last += 1
+        last = _group(columns_in, first, count_in, plane, ny, 2 * widest)
         first_y, last_y = columns_in[first] - plane, columns_in[last - 1] - plane
         bound = _largest(peak[plane + max(first_y - widest, 0) : plane + min(last_y + widest + 1, ny)])
         reach = int(math.sqrt(bound))
@@ -185,17 +203,11 @@ def carry_y(
                     _lower(h[begin:end], g[begin - shift : end - shift], offset * offset)
         raised = False
         for n in range(first, last):
-            if rose_in[n] > cap:
-                continue
-            raised = True
-            new = g[columns_in[n] * nz : (columns_in[n] + 1) * nz]
-            was = old_in[n * nz : (n + 1) * nz]
-            for y in range(low, high):
-                offset = columns_in[n] - plane - y
-                if marked[y] == 0 and offset * offset + rose_in[n] <= peak[plane + y]:
-                    here = h[(plane + y) * nz : (plane + y + 1) * nz]
-                    if _any_equal_raised(here, was, new, offset * offset):
-                        marked[y] = 1
+            if rose_in[n] <= cap:
+                raised = True
+                new = g[columns_in[n] * nz : (columns_in[n] + 1) * nz]
+                was = old_in[n * nz : (n + 1) * nz]
+                _mark_raised(h, peak, plane, low, high, columns_in[n] - plane, rose_in[n], was, new, marked)
         if raised:
             total = _runs(rows, marked, low, high, runs)
             for n in range(total):
@@ -274,84 +286,3 @@ def carry_x(
             bound = max(bound, _recompute_run(f, h, begin, end, plane, 0, nx * plane))
         marked[x * ny + low : x * ny + high] = 0
     return bound
-
-
-@nb.njit(cache=True)
-def list_changed(
-    shape: tuple[int, int, int], touched: Int32, outside: Int16, inside: Int16, published: Int16,
-    seen: UInt8, begins: Int32, ends: Int32,
-) -> tuple[int, int]:  # fmt: skip
-    """List, ascending, the part of each touched column that holds its changes; count parts and changes."""
-    nx, ny, nz = shape
-    count, total = 0, 0
-    for x in range(nx):
-        for y in range(touched[x, 0], touched[x, 1]):
-            begin = (x * ny + y) * nz
-            far, near = outside[begin : begin + nz], inside[begin : begin + nz]
-            was, fresh = published[begin : begin + nz], seen[begin : begin + nz]
-            changes, low, high = np.int16(0), np.int16(nz), np.int16(0)
-            for k in range(nz):
-                differs = (np.int16(far[k] - near[k]) != was[k]) | (fresh[k] != 0)
-                changes = np.int16(changes + differs)
-                low = min(low, np.int16(k) if differs else np.int16(nz))
-                high = max(high, np.int16(k + 1) if differs else np.int16(0))
-            if changes > 0:
-                begins[count] = begin + low
-                ends[count] = begin + high
-                count += 1
-                total += int(changes)
-        touched[x, 0] = ny
-        touched[x, 1] = 0
-    return count, total
-
-
-@nb.njit(cache=True)
-def emit(
-    begins: Int32, ends: Int32, outside: Int16, inside: Int16, published: Int16, seen: UInt8,
-    table: Float32, cap: int, max_distance_m: float, distance: Float32,
-    voxel: Int32, old: Float32, new: Float32, first_seen: UInt8, occupied: UInt8,
-) -> None:  # fmt: skip
-    """Publish the distances of the listed parts and write the change log (with one spare row)."""
-    beyond = np.float32(max_distance_m)
-    count = np.uint64(0)  # unsigned: numba then leaves out the test for negative indices
-    for n in range(begins.shape[0]):
-        begin, end = begins[n], ends[n]
-        far, near = outside[begin:end], inside[begin:end]
-        was, fresh, metres = published[begin:end], seen[begin:end], distance[begin:end]
-        for k in range(end - begin):  # every row is written, and kept when it changed: no branches
-            value = np.int16(far[k] - near[k])
-            after = table[np.uint64(value + cap)]
-            voxel[count] = begin + k
-            old[count] = beyond if fresh[k] else metres[k]
-            new[count] = after
-            first_seen[count] = fresh[k]
-            occupied[count] = near[k] > 0
-            count += np.uint64((value != was[k]) | (fresh[k] != 0))
-            metres[k] = after
-        for k in range(end - begin):
-            was[k] = np.int16(far[k] - near[k])
-        fresh[:] = 0
-
-
-@nb.njit(cache=True)
-def flag_columns(shape: tuple[int, int, int], voxels: Int32, flagged: UInt8, box: Int32) -> None:
-    """Flag the columns of flat voxels and widen their bounding box (x0, x1, y0, y1)."""
-    _, ny, nz = shape
-    for n in range(voxels.shape[0]):
-        column = voxels[n] // nz
-        x, y = column // ny, column % ny
-        flagged[column] = 1
-        box[0], box[1] = min(box[0], x), max(box[1], x + 1)
-        box[2], box[3] = min(box[2], y), max(box[3], y + 1)
-
-
-@nb.njit(cache=True)
-def mark_seen(shape: tuple[int, int, int], voxels: Int32, seen: UInt8, touched: Int32) -> None:
-    """Mark voxels first seen and have their columns looked at."""
-    _, ny, nz = shape
-    for n in range(voxels.shape[0]):
-        column = voxels[n] // nz
-        x, y = column // ny, column % ny
-        seen[voxels[n]] = 1
-        touched[x, 0] = min(touched[x, 0], y)
-        touched[x, 1] = max(touched[x, 1], y + 1)

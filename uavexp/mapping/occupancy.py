@@ -62,6 +62,17 @@ class Rule(NamedTuple):
     max_evidence: int
 
 
+class Voxels(NamedTuple):
+    """The arrays of a map that kernels write, flat, C order."""
+
+    shape: tuple[int, int, int]
+    tsdf_m: Float32  # (N,) fused distance
+    weight: UInt8  # (N,) of the fused distance
+    live: UInt8  # (N,) state and evidence as of now
+    state: UInt8  # (N,) as of the last publication
+    changes: Int32  # (N,) voxels whose live state has left the published one; a count tells how many
+
+
 @nb.njit(cache=True, inline="always")
 def keeps_free(observed_m: float, fused_m: float, weight: int, byte: int, rule: Rule) -> bool:
     """Whether an observation from behind a surface must not touch a voxel measured to be free."""
@@ -96,44 +107,57 @@ def judge(
 
 
 @nb.njit(cache=True, inline="always")
-def enlist(at: int, byte: int, live: UInt8, state: UInt8, changes: Int32, count: int) -> int:
+def enlist(voxels: Voxels, at: int, byte: int, count: int) -> int:
     """Store a voxel's byte; list the voxel if its state left the published one. Returns the new count."""
-    if (byte & _LISTED) == 0 and (byte & _STATE) != state[at]:
+    if (byte & _LISTED) == 0 and (byte & _STATE) != voxels.state[at]:
         byte |= _LISTED
-        changes[count] = at
+        voxels.changes[count] = at
         count += 1
-    live[at] = byte
+    voxels.live[at] = byte
     return count
 
 
 @nb.njit(cache=True)
-def _mark_ball(
-    centre: Float, radius: float, shape: tuple[int, int, int], live: UInt8, state: UInt8,
-    changes: Int32, count: int,
-) -> int:  # fmt: skip
+def reciprocals(rule: Rule) -> Float:
+    """1 / (w + 1) of every weight w."""
+    return 1.0 / np.arange(1, rule.max_weight + 2)
+
+
+@nb.njit(cache=True, inline="always")
+def observe(voxels: Voxels, at: int, observed: float, rule: Rule, reciprocal: Float, count: int) -> int:
+    """Fuse and judge one observation of a voxel, m; returns the new count of changes."""
+    before, had, byte = voxels.tsdf_m[at], np.int64(voxels.weight[at]), np.int64(voxels.live[at])
+    if not keeps_free(observed, before, had, byte, rule):
+        fused = (had * before + observed) * reciprocal[had]
+        voxels.tsdf_m[at] = fused
+        voxels.weight[at] = np.uint8(had + (had < rule.max_weight))
+        after = judge(observed, before, had, fused, byte, rule)
+        if after != byte:
+            count = enlist(voxels, at, after, count)
+    return count
+
+
+@nb.njit(cache=True)
+def _mark_ball(voxels: Voxels, centre: Float, radius: float, count: int) -> int:
     """Make unknown voxels free whose centres lie within `radius` of `centre` (voxel units)."""
-    nx, ny, nz = shape
+    nx, ny, nz = voxels.shape
     for x in range(max(int(centre[0] - radius), 0), min(int(centre[0] + radius) + 1, nx)):
         for y in range(max(int(centre[1] - radius), 0), min(int(centre[1] + radius) + 1, ny)):
             for z in range(max(int(centre[2] - radius), 0), min(int(centre[2] + radius) + 1, nz)):
                 dx, dy, dz = x + 0.5 - centre[0], y + 0.5 - centre[1], z + 0.5 - centre[2]
                 at = (x * ny + y) * nz + z
-                if (
-                    dx * dx + dy * dy + dz * dz <= radius * radius
-                    and (np.int64(live[at]) & _STATE) == _UNKNOWN
-                ):
-                    count = enlist(at, np.int64(live[at]) | _FREE, live, state, changes, count)
+                byte = np.int64(voxels.live[at])
+                if dx * dx + dy * dy + dz * dz <= radius * radius and (byte & _STATE) == _UNKNOWN:
+                    count = enlist(voxels, at, byte | _FREE, count)
     return count
 
 
 @nb.njit(cache=True)
-def _publish(
-    live: UInt8, state: UInt8, changes: Int32, count: int, flipped: Int32, first_seen: Int32
-) -> tuple[int, int]:
+def _publish(voxels: Voxels, count: int, flipped: Int32, first_seen: Int32) -> tuple[int, int]:
     """Carry listed changes from `live` to `state`; list voxels that flipped and that were first seen."""
-    flips, firsts = 0, 0
+    live, state, flips, firsts = voxels.live, voxels.state, 0, 0
     for n in range(count):
-        at = changes[n]
+        at = voxels.changes[n]
         live[at] = np.int64(live[at]) & ~_LISTED
         before, after = np.int64(state[at]), np.int64(live[at]) & _STATE
         if before == after:
@@ -217,12 +241,15 @@ class OccupancyMap:
         size = self.shape[0] * self.shape[1] * self.shape[2]
         self.origin_m: Float = np.array(bounds_m[0], dtype=np.float64)
         self.voxel_size_m = voxel_size_m
-        self.tsdf_m: Float32 = np.zeros(size, np.float32)
-        self.weight: UInt8 = np.zeros(size, np.uint8)
-        self.live: UInt8 = np.zeros(size, np.uint8)
-        self.state: UInt8 = np.zeros(size, np.uint8)
-        self.changes: Int32 = np.empty(size, np.int32)
-        self.changed = 0  # how many of `changes` are in use
+        self.voxels = Voxels(
+            shape=self.shape,
+            tsdf_m=np.zeros(size, np.float32),
+            weight=np.zeros(size, np.uint8),
+            live=np.zeros(size, np.uint8),
+            state=np.zeros(size, np.uint8),
+            changes=np.empty(size, np.int32),
+        )
+        self.changed = 0  # how many of the voxels' `changes` are in use
         self._flipped: Int32 = np.empty(size, np.int32)
         self._first_seen: Int32 = np.empty(size, np.int32)
         self._rays: tuple[Float32, Int32] | None = None
@@ -232,28 +259,23 @@ class OccupancyMap:
             voxel_size_m=voxel_size_m,
             max_distance_m=max_distance_m,
             distance=self._esdf.distance,
-            state=self.state.reshape(self.shape),
+            state=self.voxels.state.reshape(self.shape),
         )
 
     def mark_free(self, centre_m: Float, radius_m: float) -> None:
         """Make what is still unknown in a ball free; measurements override it like any other."""
         centre = (np.asarray(centre_m, dtype=np.float64) - self.origin_m) / self.voxel_size_m
-        self.changed = _mark_ball(
-            centre, radius_m / self.voxel_size_m, self.shape, self.live, self.state, self.changes,
-            self.changed,
-        )  # fmt: skip
+        self.changed = _mark_ball(self.voxels, centre, radius_m / self.voxel_size_m, self.changed)
 
     def ray_arrays(self) -> tuple[Float32, Int32]:
         """Scratch of `rays`, made at first use: observations (N,), all inf, and a list of voxels (N,)."""
         if self._rays is None:
-            size = self.tsdf_m.size
+            size = self.voxels.tsdf_m.size
             self._rays = np.full(size, np.inf, np.float32), np.empty(size, np.int32)
         return self._rays
 
     def publish(self, time_s: float) -> MapUpdate:
         """Bring state and field up to what was integrated; return what changed since last time."""
-        flips, firsts = _publish(
-            self.live, self.state, self.changes, self.changed, self._flipped, self._first_seen
-        )
+        flips, firsts = _publish(self.voxels, self.changed, self._flipped, self._first_seen)
         self.changed = 0
         return self._esdf.update(time_s, self.field.state, self._flipped[:flips], self._first_seen[:firsts])

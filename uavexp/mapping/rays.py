@@ -19,8 +19,8 @@ import math
 import numba as nb
 import numpy as np
 
-from uavexp.arrays import Float, Float32, Int32, UInt8
-from uavexp.mapping.occupancy import OccupancyMap, Rule, enlist, judge, keeps_free
+from uavexp.arrays import Float, Float32, Int32
+from uavexp.mapping.occupancy import OccupancyMap, Rule, Voxels, observe, reciprocals
 from uavexp.types import RayScan
 
 _INSIDE = 1e-6  # voxels before the grid's border: rounding must not lead out of it
@@ -202,25 +202,14 @@ def _observe(
 
 
 @nb.njit(cache=True)
-def _fuse(
-    nearest: Float32, touched: Int32, voxel_m: float, rule: Rule,
-    tsdf: Float32, weight: UInt8, live: UInt8, state: UInt8, changes: Int32, count: int,
-) -> int:  # fmt: skip
-    """Fuse the observations and clear them; arguments as `dense.integrate_scan`."""
-    reciprocal = 1.0 / np.arange(1, rule.max_weight + 2)
+def _fuse(voxels: Voxels, nearest: Float32, touched: Int32, voxel_m: float, rule: Rule, count: int) -> int:
+    """Fuse the observations and clear them; returns how many voxels now stand in `changes`."""
+    reciprocal = reciprocals(rule)
     for n in range(touched.shape[0]):
         at = touched[n]
         observed = nearest[at] * voxel_m
         nearest[at] = np.inf
-        before, had, byte = tsdf[at], np.int64(weight[at]), np.int64(live[at])
-        if keeps_free(observed, before, had, byte, rule):
-            continue
-        fused = (had * before + observed) * reciprocal[had]
-        tsdf[at] = fused
-        weight[at] = np.uint8(had + (had < rule.max_weight))
-        after = judge(observed, before, had, fused, byte, rule)
-        if after != byte:
-            count = enlist(at, after, live, state, changes, count)
+        count = observe(voxels, at, observed, rule, reciprocal, count)
     return count
 
 
@@ -231,8 +220,5 @@ def integrate_rays(scan: RayScan, grid: OccupancyMap, rule: Rule) -> Int32:
         scan.origin_m, scan.direction, scan.range_m, scan.max_range_m, rule.truncation_m,
         grid.origin_m, grid.voxel_size_m, grid.shape, nearest, touched,
     )  # fmt: skip
-    grid.changed = _fuse(
-        nearest, touched[:count], grid.voxel_size_m, rule,
-        grid.tsdf_m, grid.weight, grid.live, grid.state, grid.changes, grid.changed,
-    )  # fmt: skip
+    grid.changed = _fuse(grid.voxels, nearest, touched[:count], grid.voxel_size_m, rule, grid.changed)
     return touched[:count]

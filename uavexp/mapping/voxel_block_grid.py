@@ -28,12 +28,12 @@ from typing import Any
 import numba as nb
 import numpy as np
 
-from uavexp.arrays import Bool, Float, Float32, Int32, UInt8
+from uavexp.arrays import Bool, Float, Float32, Int32
 from uavexp.errors import ConfigError, require
 from uavexp.field import DistanceField
 from uavexp.mapping.blocks import EDGE, Blocks, blocks_of, write_voxels
 from uavexp.mapping.frustum import column_depths, frustum_box
-from uavexp.mapping.occupancy import OccupancyMap, Rule, enlist, judge, keeps_free
+from uavexp.mapping.occupancy import OccupancyMap, Rule, Voxels, enlist, judge, keeps_free
 from uavexp.mapping.parameters import MapParameters
 from uavexp.mapping.rays import integrate_rays
 from uavexp.o3d import open3d
@@ -42,6 +42,33 @@ from uavexp.types import DepthScan, MapUpdate, RayScan, Scan
 
 _LARGEST_START = 20_000  # blocks that are allocated at once; more are added when needed
 _DEVICE = re.compile(r"CPU:0|CUDA:\d+")
+
+
+@nb.njit(cache=True)
+def _is_beside(at: Float, sides: Float) -> bool:
+    """Whether all points (8, 3), seen from the camera, lie beyond one of its side planes (4, 3)."""
+    for side in range(4):
+        best = -np.inf
+        for n in range(8):
+            best = max(
+                best, sides[side, 0] * at[n, 0] + sides[side, 1] * at[n, 1] + sides[side, 2] * at[n, 2]
+            )
+        if best < 0.0:
+            return True
+    return False
+
+
+@nb.njit(cache=True)
+def _reach(at: Float, farthest: Float, fx: float, cx: float) -> float:
+    """Farthest measurement of the pixel columns that points (8, 3), seen from the camera, cover, m."""
+    low, high = 0, farthest.shape[0]
+    if at[:, 2].min() > 0.0:
+        u = fx * at[:, 0] / at[:, 2] + cx + 0.5
+        low, high = max(int(np.floor(u.min())), 0), min(int(np.floor(u.max())) + 1, high)
+    reach = -np.inf
+    for column in range(low, high):
+        reach = max(reach, farthest[column])
+    return reach
 
 
 @nb.njit(cache=True)
@@ -90,34 +117,15 @@ def _blocks_in_view(
     for i in range(first[0], last[0] + 1):
         for j in range(first[1], last[1] + 1):
             for k in range(first[2], last[2] + 1):
-                for n in range(8):
+                for n in range(8):  # the block's outermost voxel centres, seen from the camera
                     x = i * edge + (n & 1) * span - corner[0]
                     y = j * edge + ((n >> 1) & 1) * span - corner[1]
                     z = k * edge + (n >> 2) * span - corner[2]
                     for axis in range(3):
                         at[n, axis] = x * rotation[0, axis] + y * rotation[1, axis] + z * rotation[2, axis]
-                nearest, deepest = at[:, 2].min(), at[:, 2].max()
-                if deepest <= 0.0 or nearest > range_m:
+                if at[:, 2].max() <= 0.0 or at[:, 2].min() > range_m or _is_beside(at, sides):
                     continue
-                outside = False
-                for side in range(4):
-                    best = -np.inf
-                    for n in range(8):
-                        best = max(
-                            best,
-                            sides[side, 0] * at[n, 0] + sides[side, 1] * at[n, 1] + sides[side, 2] * at[n, 2],
-                        )
-                    outside = outside or best < 0.0
-                if outside:
-                    continue
-                low, high = 0, width
-                if nearest > 0.0:
-                    u = fx * at[:, 0] / at[:, 2] + cx + 0.5
-                    low, high = max(int(np.floor(u.min())), 0), min(int(np.floor(u.max())) + 1, width)
-                reach = -np.inf
-                for column in range(low, high):
-                    reach = max(reach, farthest[column])
-                if nearest > reach + truncation_m:
+                if at[:, 2].min() > _reach(at, farthest, fx, cx) + truncation_m:
                     continue
                 found[count, 0], found[count, 1], found[count, 2] = i, j, k
                 count += 1
@@ -126,13 +134,13 @@ def _blocks_in_view(
 
 @nb.njit(cache=True)
 def _take_over(
-    blocks: Int32, rows: Int32, fused: Float32, weights: Float32, axis_step: Float, axis_start: float,
-    max_range_m: float, shape: tuple[int, int, int], rule: Rule,
-    tsdf: Float32, weight: UInt8, live: UInt8, state: UInt8, changes: Int32, count: int,
+    voxels: Voxels, blocks: Int32, rows: Int32, fused: Float32, weights: Float32, axis_step: Float,
+    axis_start: float, max_range_m: float, rule: Rule, count: int,
 ) -> int:  # fmt: skip
     """Carry blocks that Open3D has just fused into the map, and what the rule says back into them.
 
     Args:
+        voxels: of the map.
         blocks: (B, 3) block coordinates.
         rows: (B,) their rows in the two arrays below.
         fused: (R, 512) Open3D's distances in truncations, x fastest.
@@ -140,16 +148,10 @@ def _take_over(
         axis_step: (3,) depth along the optical axis of a step along x, y, z, m.
         axis_start: depth of voxel (0, 0, 0), m.
         max_range_m: of the sensor.
-        shape: voxels along x, y, z of the map.
         rule: fusion and occupancy.
-        tsdf: (N,) flat, and the rest as in `dense.integrate_scan`.
-        weight: see there.
-        live: see there.
-        state: see there.
-        changes: see there.
         count: how many of `changes` are in use.
     """
-    nx, ny, nz = shape
+    nx, ny, nz = voxels.shape
     for n in range(blocks.shape[0]):
         new_d, new_w = fused[rows[n]], weights[rows[n]]
         x0, y0, z0 = blocks[n, 0] * EDGE, blocks[n, 1] * EDGE, blocks[n, 2] * EDGE
@@ -161,10 +163,10 @@ def _take_over(
                 for z in range(z0, min(z0 + EDGE, nz)):
                     local = inner + EDGE * EDGE * (z - z0)
                     at = column + z
-                    had = np.int64(weight[at])
+                    had = np.int64(voxels.weight[at])
                     if new_w[local] <= had:
                         continue
-                    before, byte = tsdf[at], np.int64(live[at])
+                    before, byte = voxels.tsdf_m[at], np.int64(voxels.live[at])
                     after = new_d[local] * rule.truncation_m
                     observed = (had + 1) * after - had * before
                     beyond = depth + z * axis_step[2] > max_range_m and observed > 0.0
@@ -172,12 +174,12 @@ def _take_over(
                         new_d[local] = before / rule.truncation_m
                         new_w[local] = had
                         continue
-                    tsdf[at] = after
-                    weight[at] = np.uint8(had + (had < rule.max_weight))
-                    new_w[local] = weight[at]
+                    voxels.tsdf_m[at] = after
+                    voxels.weight[at] = np.uint8(had + (had < rule.max_weight))
+                    new_w[local] = voxels.weight[at]
                     moved = judge(observed, before, had, after, byte, rule)
                     if moved != byte:
-                        count = enlist(at, moved, live, state, changes, count)
+                        count = enlist(voxels, at, moved, count)
     return count
 
 
@@ -242,9 +244,8 @@ class VoxelBlockGrid(MapParameters):
         axis = scan.camera_rotation[:, 2]
         with Blocks(self._grid, blocks, self._on) as (rows, fused, weights):
             grid.changed = _take_over(
-                blocks, rows, fused, weights, axis * self.voxel_size_m, -float(axis @ corner),
-                scan.max_range_m, grid.shape, self.rule(),
-                grid.tsdf_m, grid.weight, grid.live, grid.state, grid.changes, grid.changed,
+                grid.voxels, blocks, rows, fused, weights, axis * self.voxel_size_m, -float(axis @ corner),
+                scan.max_range_m, self.rule(), grid.changed,
             )  # fmt: skip
 
     def update(self, time_s: float) -> MapUpdate:
@@ -278,7 +279,7 @@ class VoxelBlockGrid(MapParameters):
             return
         self._grid.hashmap().activate(open3d.core.Tensor(blocks, device=self._on))
         with Blocks(self._grid, blocks, self._on) as (rows, fused, weights):
-            write_voxels(touched, local, rows, grid.tsdf_m, grid.weight, self.truncation_m, fused, weights)
+            write_voxels(touched, local, rows, grid.voxels, self.truncation_m, fused, weights)
 
     def _fuse(self, scan: DepthScan, blocks: Int32, corner: Float) -> None:
         """Let Open3D integrate the scan into `blocks`."""
