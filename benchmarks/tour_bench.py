@@ -15,9 +15,9 @@ import numpy as np
 
 from uavexp.arrays import Float
 from uavexp.field import DistanceField
-from uavexp.inspection import clusters as runs
-from uavexp.inspection.plan import InspectionPlan, Settings, path_from, plan_inspection
-from uavexp.inspection.reference import reference_field, surface_of_mesh
+from uavexp.inspection import tour_clusters as runs
+from uavexp.inspection.inspection_plan import InspectionPlan, Settings, path_from, plan_inspection
+from uavexp.inspection.reference_surface import reference_field, surface_of_mesh
 from uavexp.inspection.travel import travel_matrix
 from uavexp.inspection.view_angle import choose_yaw
 from uavexp.inspection.viewpoints import Pattern

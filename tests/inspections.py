@@ -8,7 +8,7 @@ import numpy as np
 
 from uavexp.arrays import Float, Float32, Int32
 from uavexp.field import DistanceField
-from uavexp.inspection.reference import Surface, reference_field, surface_of_mesh
+from uavexp.inspection.reference_surface import Surface, reference_field, surface_of_mesh
 
 START_M = np.array([1.03, 1.02, 1.21])
 

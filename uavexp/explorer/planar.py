@@ -9,10 +9,8 @@ import numpy as np
 from scipy import ndimage
 
 from uavexp.arrays import Bool, Float, Float32, Int, Int32, UInt8
-from uavexp.field import value_and_gradient
+from uavexp.field import FREE, UNKNOWN, value_and_gradient
 from uavexp.o3d import open3d
-
-UNKNOWN, FREE = 0, 1  # values of `PlanarMap.state` used here
 
 _OFFSETS = np.array([(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)], dtype=np.int64)
 
@@ -20,6 +18,26 @@ _OFFSETS = np.array([(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0
 _UNIT = 100  # lengths are counted in hundredths of a cell: integers, so buckets serve as queue
 _DIAGONAL = 0.7071067811865476
 _BUCKETS = 1024  # > the longest step, 2 cells of the greatest cost
+
+
+@nb.njit(cache=True, inline="always")
+def _put_in(head: Int32, following: Int32, previous: Int32, slot: int, cell: int) -> None:
+    """Add a cell in front of a bucket's doubly linked list."""
+    previous[cell], following[cell] = -1, head[slot]
+    if head[slot] >= 0:
+        previous[head[slot]] = cell
+    head[slot] = cell
+
+
+@nb.njit(cache=True, inline="always")
+def _take_out(head: Int32, following: Int32, previous: Int32, slot: int, cell: int) -> None:
+    """Take a cell out of a bucket's list."""
+    if previous[cell] >= 0:
+        following[previous[cell]] = following[cell]
+    else:
+        head[slot] = following[cell]
+    if following[cell] >= 0:
+        previous[following[cell]] = previous[cell]
 
 
 @nb.njit(cache=True)
@@ -55,9 +73,7 @@ def path_lengths(passable: Bool, cost: Int32, source: tuple[int, int], wanted: I
         if flat < 0:
             now += 1
             continue
-        head[slot] = following[flat]
-        if following[flat] >= 0:
-            previous[following[flat]] = -1
+        _take_out(head, following, previous, slot, flat)
         waiting -= 1
         if asked[flat]:
             missing -= 1
@@ -79,21 +95,12 @@ def path_lengths(passable: Bool, cost: Int32, source: tuple[int, int], wanted: I
             near, there = a * ny + b, now + step
             if there >= length[near]:
                 continue
-            if length[near] != far:  # already waiting: take it out of its bucket
-                if previous[near] >= 0:
-                    following[previous[near]] = following[near]
-                else:
-                    head[length[near] % _BUCKETS] = following[near]
-                if following[near] >= 0:
-                    previous[following[near]] = previous[near]
-                waiting -= 1
+            if length[near] == far:
+                waiting += 1
+            else:
+                _take_out(head, following, previous, length[near] % _BUCKETS, near)
             length[near] = there
-            slot = there % _BUCKETS
-            previous[near], following[near] = -1, head[slot]
-            if head[slot] >= 0:
-                previous[head[slot]] = near
-            head[slot] = near
-            waiting += 1
+            _put_in(head, following, previous, there % _BUCKETS, near)
     cells = np.empty((nx, ny), dtype=np.float32)
     for flat in range(nx * ny):
         cells[flat // ny, flat % ny] = np.inf if length[flat] == far else length[flat] / _UNIT

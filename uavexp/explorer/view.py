@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from uavexp.arrays import Bool, Float, Float32, Int
-from uavexp.explorer.planar import FREE, UNKNOWN, path_lengths
+from uavexp.explorer.planar import path_lengths
+from uavexp.field import FREE, UNKNOWN
 from uavexp.mapping.projection import PlanarMap
 
 

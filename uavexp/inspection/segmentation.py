@@ -11,7 +11,7 @@ import numpy as np
 from uavexp.arrays import Float, Int, Int32
 from uavexp.errors import require, require_positive
 from uavexp.inspection.normals import neighbours
-from uavexp.inspection.reference import Surface
+from uavexp.inspection.reference_surface import Surface
 
 MAX_NEIGHBOURS = 32
 

@@ -10,7 +10,7 @@ import numba as nb
 import numpy as np
 
 from uavexp.arrays import Bool, Float, Float32, Int, Int32
-from uavexp.inspection.lattice import EDGE_UNITS, Lattice
+from uavexp.inspection.travel_lattice import EDGE_UNITS, Lattice
 
 _FINE_UNITS = 8000  # the same between points, where edges are long
 _NEAREST = 100  # points that the wave from a point must reach; those beyond go through them
@@ -146,46 +146,8 @@ def _over_lattice(
     for source in range(gate.shape[0]):
         reached[:] = far
         head[:] = -1
-        entries, waiting, now, found = 0, 0, 0, 0
-        for item in range(gate.shape[1]):
-            node = gate[source, item]
-            if node < 0:
-                continue
-            begin = np.int32(leg[source, item] / unit_m + 0.5)
-            if begin < reached[node]:
-                reached[node] = begin
-        for item in range(gate.shape[1]):  # legs of any length: entered when their time comes
-            node = gate[source, item]
-            if node >= 0:
-                node_of[entries], following[entries] = node, head[reached[node] % buckets]
-                head[reached[node] % buckets] = entries
-                entries, waiting = entries + 1, waiting + 1
-        while waiting > 0 and found < enough:
-            entry = head[now % buckets]
-            if entry < 0:
-                now += 1
-                continue
-            later = -1
-            while entry >= 0:
-                head[now % buckets] = following[entry]
-                node = node_of[entry]
-                if reached[node] > now:  # a long leg, of a later round
-                    following[entry], later = later, entry
-                elif reached[node] == now:
-                    waiting -= 1
-                    found += asked[node]
-                    for edge in range(starts[node], starts[node + 1]):
-                        near, there = ends[edge], now + units[edge]
-                        if there < reached[near]:
-                            reached[near] = there
-                            node_of[entries], following[entries] = near, head[there % buckets]
-                            head[there % buckets] = entries
-                            entries, waiting = entries + 1, waiting + 1
-                else:
-                    waiting -= 1  # outdated
-                entry = head[now % buckets]
-            head[now % buckets] = later
-            now += 1
+        _spread(starts, ends, units, unit_m, gate[source], leg[source], asked, enough, reached, head,
+                node_of, following)  # fmt: skip
         for target in range(other.shape[0]):
             for item in range(other.shape[1]):
                 node = other[target, item]
@@ -193,6 +155,52 @@ def _over_lattice(
                     way = reached[node] * unit_m + other_leg[target, item]
                     length[source, target] = min(length[source, target], way)
     return length
+
+
+@nb.njit(cache=True)
+def _spread(
+    starts: Int32, ends: Int32, units: Int32, unit_m: float, gate: Int, leg: Float, asked: Int32,
+    enough: int, reached: Int32, head: Int32, node_of: Int32, following: Int32,
+) -> None:  # fmt: skip
+    """Send one wave from the gates of a point; `head`, `node_of`, `following` are its buckets' lists."""
+    buckets = head.shape[0]
+    entries, waiting, now, found = 0, 0, 0, 0
+    for item in range(gate.shape[0]):
+        node = gate[item]
+        if node >= 0:
+            reached[node] = min(reached[node], np.int32(leg[item] / unit_m + 0.5))
+    for item in range(gate.shape[0]):  # legs of any length: entered when their time comes
+        node = gate[item]
+        if node >= 0:
+            node_of[entries], following[entries] = node, head[reached[node] % buckets]
+            head[reached[node] % buckets] = entries
+            entries, waiting = entries + 1, waiting + 1
+    while waiting > 0 and found < enough:
+        entry = head[now % buckets]
+        if entry < 0:
+            now += 1
+            continue
+        later = -1
+        while entry >= 0:
+            head[now % buckets] = following[entry]
+            node = node_of[entry]
+            if reached[node] > now:  # a long leg, of a later round
+                following[entry], later = later, entry
+            elif reached[node] == now:
+                waiting -= 1
+                found += asked[node]
+                for edge in range(starts[node], starts[node + 1]):
+                    near, there = ends[edge], now + units[edge]
+                    if there < reached[near]:
+                        reached[near] = there
+                        node_of[entries], following[entries] = near, head[there % buckets]
+                        head[there % buckets] = entries
+                        entries, waiting = entries + 1, waiting + 1
+            else:
+                waiting -= 1  # outdated
+            entry = head[now % buckets]
+        head[now % buckets] = later
+        now += 1
 
 
 @nb.njit(cache=True)

@@ -16,7 +16,7 @@ import numpy as np
 from uavexp.arrays import Bool, Float, Int
 from uavexp.errors import require, require_non_negative
 from uavexp.field import DistanceField
-from uavexp.inspection.reference import Surface
+from uavexp.inspection.reference_surface import Surface
 from uavexp.inspection.viewpoints import Viewpoints
 from uavexp.inspection.visibility import Camera, Grid, Optics, Views, framed_turns, half_turn, sighted_cells
 

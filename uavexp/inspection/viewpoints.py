@@ -18,7 +18,7 @@ import numpy as np
 
 from uavexp.arrays import Bool, Float, Int
 from uavexp.errors import require, require_positive
-from uavexp.inspection.reference import Surface
+from uavexp.inspection.reference_surface import Surface
 from uavexp.inspection.segmentation import Segment
 from uavexp.inspection.visibility import Camera, Grid, Views, seen_by, views_of
 

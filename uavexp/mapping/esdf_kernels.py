@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from uavexp.arrays import Int32, UInt8
+from uavexp.field import OCCUPIED
 
 Int16 = npt.NDArray[np.int16]
-_OCCUPIED = 2  # `uavexp.mapping.base.OCCUPIED`; a literal so that the kernels compile it in
 _MERGE_GAP = 3  # columns: runs closer than this are treated as one
 
 
@@ -66,7 +66,7 @@ def _scan_column(state: UInt8, to_occupied: bool, cap: int, out: Int16) -> None:
     count = out.shape[0]
     distance = cap
     for k in range(count):
-        distance = 0 if (state[k] == _OCCUPIED) == to_occupied else min(distance + 1, cap)
+        distance = 0 if (state[k] == OCCUPIED) == to_occupied else min(distance + 1, cap)
         out[k] = min(distance * distance, cap)
     distance = cap
     for k in range(count - 1, -1, -1):

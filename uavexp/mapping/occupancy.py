@@ -36,11 +36,10 @@ import numpy as np
 
 from uavexp.arrays import Float, Float32, Int32, UInt8
 from uavexp.errors import WorldError, require
-from uavexp.field import DistanceField
+from uavexp.field import FREE, OCCUPIED, UNKNOWN, DistanceField
 from uavexp.mapping.esdf import SignedDistance
 from uavexp.types import MapUpdate
 
-_UNKNOWN, _FREE, _OCCUPIED = 0, 1, 2  # of `mapping.base`; literals so that kernels compile them in
 # bits of a live voxel's byte: 0-1 state, 2 on the list of changes, 3-7 evidence
 _STATE, _LISTED, _EVIDENCE = 3, 4, 3
 LARGEST_EVIDENCE = 31
@@ -97,12 +96,12 @@ def judge(
     state = byte & _STATE
     if judged < rule.occupied_below_m:
         evidence = min(evidence + rule.hit_evidence, rule.max_evidence)
-    elif judged > rule.free_above_m or state != _OCCUPIED:
+    elif judged > rule.free_above_m or state != OCCUPIED:
         evidence = max(evidence - rule.miss_evidence, 0)
     if evidence >= rule.occupied_evidence:
-        state = _OCCUPIED
+        state = OCCUPIED
     elif evidence == 0:
-        state = _FREE
+        state = FREE
     return (evidence << _EVIDENCE) | (byte & _LISTED) | state
 
 
@@ -147,8 +146,8 @@ def _mark_ball(voxels: Voxels, centre: Float, radius: float, count: int) -> int:
                 dx, dy, dz = x + 0.5 - centre[0], y + 0.5 - centre[1], z + 0.5 - centre[2]
                 at = (x * ny + y) * nz + z
                 byte = np.int64(voxels.live[at])
-                if dx * dx + dy * dy + dz * dz <= radius * radius and (byte & _STATE) == _UNKNOWN:
-                    count = enlist(voxels, at, byte | _FREE, count)
+                if dx * dx + dy * dy + dz * dz <= radius * radius and (byte & _STATE) == UNKNOWN:
+                    count = enlist(voxels, at, byte | FREE, count)
     return count
 
 
@@ -162,10 +161,10 @@ def _publish(voxels: Voxels, count: int, flipped: Int32, first_seen: Int32) -> t
         before, after = np.int64(state[at]), np.int64(live[at]) & _STATE
         if before == after:
             continue
-        if before == _UNKNOWN:
+        if before == UNKNOWN:
             first_seen[firsts] = at
             firsts += 1
-        if (before == _OCCUPIED) != (after == _OCCUPIED):
+        if (before == OCCUPIED) != (after == OCCUPIED):
             flipped[flips] = at
             flips += 1
         state[at] = after

@@ -8,9 +8,9 @@ import numpy as np
 
 from uavexp.arrays import Bool, Float, Int
 from uavexp.field import DistanceField
-from uavexp.inspection.lattice import lattice_of
-from uavexp.inspection.plan import sparse_places
-from uavexp.inspection.reference import Surface
+from uavexp.inspection.inspection_plan import sparse_places
+from uavexp.inspection.reference_surface import Surface
+from uavexp.inspection.travel_lattice import lattice_of
 from uavexp.inspection.visibility import Camera, Grid, visible_cells, witnesses
 from uavexp.scene import Scene
 from uavexp.types import World

@@ -14,8 +14,14 @@ from uavexp.arrays import Float
 from uavexp.errors import WorldError, require, require_non_negative, require_option, require_positive
 from uavexp.explorer.base import Explorer
 from uavexp.geometry import yaw_of
-from uavexp.inspection.plan import InspectionPlan, Settings, plan_inspection, upright, visited_by_nearest
-from uavexp.inspection.reference import reference_field, surface_of_mesh
+from uavexp.inspection.inspection_plan import (
+    InspectionPlan,
+    Settings,
+    plan_inspection,
+    upright,
+    visited_by_nearest,
+)
+from uavexp.inspection.reference_surface import reference_field, surface_of_mesh
 from uavexp.inspection.view_angle import Weights
 from uavexp.inspection.viewpoints import Pattern
 from uavexp.inspection.visibility import Camera

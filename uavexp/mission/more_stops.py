@@ -6,10 +6,10 @@ import numpy as np
 
 from uavexp.arrays import Bool, Float
 from uavexp.field import DistanceField
-from uavexp.inspection.lattice import lattice_of
-from uavexp.inspection.plan import Settings, path_from, sparse_places
-from uavexp.inspection.reference import Surface
+from uavexp.inspection.inspection_plan import Settings, path_from, sparse_places
+from uavexp.inspection.reference_surface import Surface
 from uavexp.inspection.travel import is_reachable, travel_lengths, travel_matrix
+from uavexp.inspection.travel_lattice import lattice_of
 from uavexp.inspection.viewpoints import Viewpoints, added
 from uavexp.inspection.visibility import Camera, Grid, Views, witnesses
 from uavexp.types import Observation

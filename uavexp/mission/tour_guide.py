@@ -23,7 +23,7 @@ import numpy as np
 
 from uavexp.arrays import Bool, Float
 from uavexp.geometry import wrap_angle, yaw_of
-from uavexp.inspection.plan import InspectionPlan, Settings, adapt_order
+from uavexp.inspection.inspection_plan import InspectionPlan, Settings, adapt_order
 from uavexp.inspection.view_angle import Weights, cell_weights, choose_yaw
 from uavexp.inspection.viewpoints import Viewpoints
 from uavexp.inspection.visibility import Camera, visible_cells

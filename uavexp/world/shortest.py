@@ -235,7 +235,7 @@ def _search(
     target: Float,
 ) -> Int32:  # fmt: skip
     """Parent (size + 1,) of each node that the search reached, -1 of the others; the last is the target."""
-    size = tested.shape[0]
+    size = np.int64(tested.shape[0])
     cost = np.full(size + 1, np.inf)
     parent = np.full(size + 1, -1, dtype=np.int32)
     closed = np.zeros(size + 1, dtype=np.bool_)
@@ -258,7 +258,7 @@ def _search(
             if cost[flat] + hop < cost[size]:
                 cost[size] = cost[flat] + hop
                 parent[size] = flat
-                heapq.heappush(heap, (cost[size], 0.0, np.int64(size)))
+                heapq.heappush(heap, (float(cost[size]), 0.0, size))
         i, j, k = _index(nodes, flat)
         for step in range(27):
             di, dj, dk = step // 9 - 1, step // 3 % 3 - 1, step % 3 - 1

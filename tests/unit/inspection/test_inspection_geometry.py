@@ -10,7 +10,7 @@ import pytest
 from tests.inspections import START_M, boxes, building, surface_in, two_rooms
 from uavexp.arrays import Bool, Float
 from uavexp.errors import ConfigError
-from uavexp.inspection.reference import surface_of_cloud
+from uavexp.inspection.reference_surface import surface_of_cloud
 from uavexp.inspection.segmentation import Growing, segments_of
 from uavexp.inspection.viewpoints import Pattern, needed, pattern_of
 from uavexp.inspection.visibility import Camera, Views

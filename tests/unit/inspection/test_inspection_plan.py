@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.inspections import START_M, building, surface_in
-from uavexp.inspection.plan import InspectionPlan, Settings, adapt_order, plan_inspection
+from uavexp.inspection.inspection_plan import InspectionPlan, Settings, adapt_order, plan_inspection
 from uavexp.inspection.visibility import Camera
 
 HALL = building()

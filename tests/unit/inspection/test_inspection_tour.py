@@ -12,10 +12,10 @@ import pytest
 from uavexp.arrays import Float
 from uavexp.check.fields import box, empty, field_from
 from uavexp.errors import ConfigError
-from uavexp.inspection import clusters as runs
-from uavexp.inspection.lattice import lattice_of
+from uavexp.inspection import tour_clusters as runs
 from uavexp.inspection.tour import closed_tour, main, open_tour, tour_length
 from uavexp.inspection.travel import is_reachable, travel_lengths, travel_matrix
+from uavexp.inspection.travel_lattice import lattice_of
 
 
 def apart(points: Float) -> Float:

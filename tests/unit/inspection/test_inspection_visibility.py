@@ -9,7 +9,7 @@ import pytest
 
 from uavexp.arrays import Float
 from uavexp.check.fields import box, empty, field_from
-from uavexp.inspection.reference import Surface
+from uavexp.inspection.reference_surface import Surface
 from uavexp.inspection.view_angle import Weights, blocked_viewpoints, cell_weights, choose_yaw
 from uavexp.inspection.viewpoints import Viewpoints
 from uavexp.inspection.visibility import (

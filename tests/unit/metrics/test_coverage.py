@@ -11,7 +11,7 @@ import pytest
 from tests.inspections import START_M, boxes, building, surface_in
 from tests.logs import make_log, make_world
 from uavexp.arrays import Bool, Float
-from uavexp.inspection.reference import Surface, reference_field
+from uavexp.inspection.reference_surface import Surface, reference_field
 from uavexp.inspection.visibility import Camera
 from uavexp.metrics import coverage as figures
 from uavexp.mission.coverage import Coverage, is_met, reachable_m, visible_anywhere

@@ -17,7 +17,7 @@ from uavexp.config.overrides import parse_settings
 from uavexp.errors import ConfigError, WorldError
 from uavexp.field import OCCUPIED, DistanceField
 from uavexp.geometry import quaternion_from_yaw
-from uavexp.inspection.plan import nearest_order
+from uavexp.inspection.inspection_plan import nearest_order
 from uavexp.inspection.travel import travel_matrix
 from uavexp.mission.inspect import Inspect
 from uavexp.mission.tour_guide import TourGuide

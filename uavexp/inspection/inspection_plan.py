@@ -10,12 +10,12 @@ import numpy as np
 from uavexp.arrays import Bool, Float, Int
 from uavexp.errors import require
 from uavexp.field import DistanceField
-from uavexp.inspection import clusters as runs
-from uavexp.inspection.lattice import Lattice, lattice_of
-from uavexp.inspection.reference import Surface
+from uavexp.inspection import tour_clusters as runs
+from uavexp.inspection.reference_surface import Surface
 from uavexp.inspection.segmentation import Growing, Segment, segments_of
 from uavexp.inspection.tour import open_tour
 from uavexp.inspection.travel import is_reachable, travel_lengths, travel_matrix
+from uavexp.inspection.travel_lattice import Lattice, lattice_of
 from uavexp.inspection.viewpoints import Pattern, Viewpoints, added, needed, pattern_of
 from uavexp.inspection.visibility import Camera, Grid, Views, seen_by, views_of, witnesses
 
