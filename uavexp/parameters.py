@@ -27,41 +27,48 @@ T = TypeVar("T")
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
-class Rule:
+class Constraint:
     """What a value must be beyond its type, in words and as a test."""
 
     words: str
     holds: Callable[[Any], bool]
 
 
-def above(least: float) -> Rule:
+def above(least: float) -> Constraint:
     """Greater than a number."""
-    return Rule(f"> {least:g}", lambda value: value > least)
+    return Constraint(f"> {least:g}", lambda value: value > least)
 
 
-def at_least(least: float) -> Rule:
+def below(most: float) -> Constraint:
+    """Less than a number."""
+    return Constraint(f"< {most:g}", lambda value: value < most)
+
+
+def at_least(least: float) -> Constraint:
     """A number or more."""
-    return Rule(f">= {least:g}", lambda value: value >= least)
+    return Constraint(f">= {least:g}", lambda value: value >= least)
 
 
-def at_most(most: float) -> Rule:
+def at_most(most: float) -> Constraint:
     """A number or less."""
-    return Rule(f"<= {most:g}", lambda value: value <= most)
+    return Constraint(f"<= {most:g}", lambda value: value <= most)
 
 
-def between(least: float, most: float) -> Rule:
+def between(least: float, most: float) -> Constraint:
     """From one number to another, both included."""
-    return Rule(f"{least:g} to {most:g}", lambda value: least <= value <= most)
+    return Constraint(f"{least:g} to {most:g}", lambda value: least <= value <= most)
 
 
-FINITE = Rule("finite", math.isfinite)
+FINITE = Constraint("finite", math.isfinite)
 Finite = Annotated[float, FINITE]
 Positive = Annotated[float, above(0), FINITE]
 NonNegative = Annotated[float, at_least(0), FINITE]
 Share = Annotated[float, between(0, 1)]
+PositiveShare = Annotated[float, above(0), at_most(1)]
+Whole = Annotated[int, at_least(0)]
 Count = Annotated[int, at_least(1)]
 Vector = tuple[Finite, Finite, Finite]
-Range = Annotated[tuple[Positive, Positive], Rule("[least, greatest]", lambda pair: pair[0] <= pair[1])]
+Range = Annotated[tuple[Positive, Positive], Constraint("[least, greatest]", lambda pair: pair[0] <= pair[1])]
 
 
 class Unknown(StrEnum):
@@ -169,7 +176,8 @@ def _convert(name: str, value: Any, annotation: Any) -> Any:
     if annotation is Any or annotation is object:
         return value
     if origin is Annotated:
-        return _ruled(name, _convert(name, value, arguments[0]), arguments[1:])
+        is_nan = isinstance(value, float) and math.isnan(value)  # which no bounds hold
+        return _constrained(name, value if is_nan else _convert(name, value, arguments[0]), arguments[1:])
     if origin in (Union, types.UnionType):
         return _convert_union(name, value, arguments)
     if origin is Literal:
@@ -191,9 +199,9 @@ def _convert(name: str, value: Any, annotation: Any) -> Any:
     return value
 
 
-def _ruled(name: str, value: Any, rules: Iterable[Rule]) -> Any:
-    words = " and ".join(rule.words for rule in rules)
-    require(all(rule.holds(value) for rule in rules), f"{name} must be {words}, got {plain(value)}")
+def _constrained(name: str, value: Any, constraints: Sequence[Constraint]) -> Any:
+    words = " and ".join(item.words for item in constraints)
+    require(all(item.holds(value) for item in constraints), f"{name} must be {words}, got {plain(value)!r}")
     return value
 
 

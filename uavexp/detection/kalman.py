@@ -13,11 +13,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
 from uavexp.arrays import Float
+from uavexp.parameters import FINITE, Positive, at_least
 
 
 class Estimate(StrEnum):
@@ -42,6 +43,19 @@ class Motion(NamedTuple):
     acceleration_density: float = 0.1  # q of the level axes, m²/s³
     adaptivity: float = 20.0  # q is raised at most so many times; 1: never
     fading: float = 0.3  # share of the average innovation that is kept at an observation
+
+
+@dataclass(slots=True, kw_only=True)
+class FilterParameters:
+    """Parameters that every detection with filters has."""
+
+    position_noise_m: Positive = 0.08  # m, standard deviation of an observed centre, per axis [ours]
+    acceleration_density: Positive = 0.1  # m²/s³, q of the process noise on the level axes,
+    # while the model holds [ours]
+    adaptivity: Annotated[float, at_least(1), FINITE] = 20.0  # 1, q is raised at most so many times while
+    # innovations are large (paper: during manoeuvres); 1: never
+    estimate: Estimate = Estimate.KALMAN  # kalman | raw: velocities from the last two observed places,
+    # the baseline [ours]
 
 
 @lru_cache(maxsize=64)

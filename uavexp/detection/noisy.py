@@ -6,39 +6,28 @@ filter each, as in `sensed`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from uavexp.arrays import Int
 from uavexp.bodies import present
-from uavexp.detection.kalman import Estimate, Motion, MotionFilter
+from uavexp.detection.kalman import FilterParameters, Motion, MotionFilter
 from uavexp.detection.returns import without_bodies
-from uavexp.errors import require, require_non_negative, require_option, require_positive
 from uavexp.field import DistanceField
+from uavexp.parameters import NonNegative, option
 from uavexp.types import Bodies, Limits, Scan, Tracks
 
 
-@dataclass(slots=True, kw_only=True)
-class Noisy:
+@option
+class Noisy(FilterParameters):
     """Every body is seen, its centre with noise; returns within `margin_m` of one are its own."""
 
-    margin_m: float = 0.1
-    position_noise_m: float = 0.08
-    acceleration_density: float = 0.1
-    adaptivity: float = 20.0
-    estimate: Estimate = Estimate.KALMAN
+    margin_m: NonNegative = 0.1  # m, returns so near to a mover are taken for its own:
+    # three sigma of the sensors' noise [ours]
     _rng: np.random.Generator | None = field(init=False, repr=False, default=None)
     _filters: dict[int, MotionFilter] = field(init=False, repr=False, default_factory=dict)
     _time_s: float = field(init=False, repr=False, default=np.nan)
-
-    def __post_init__(self) -> None:
-        require_non_negative(margin_m=self.margin_m)
-        require_positive(
-            position_noise_m=self.position_noise_m, acceleration_density=self.acceleration_density
-        )
-        require(1.0 <= self.adaptivity < np.inf, f"adaptivity must be >= 1 and finite, got {self.adaptivity}")
-        self.estimate = require_option("estimate", self.estimate, Estimate)
 
     def reset(self, limits: Limits, rng: np.random.Generator) -> None:
         """Begin a trial; draws nothing yet."""

@@ -19,66 +19,46 @@ seen is never taken for a mover. Such returns are clustered and tracked (`tracke
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from uavexp.arrays import Bool, Float
 from uavexp.detection.clusters import cluster, split
-from uavexp.detection.kalman import Estimate, Motion
+from uavexp.detection.kalman import FilterParameters, Motion
 from uavexp.detection.returns import free_at, returns, viewpoint_m, without
 from uavexp.detection.tracker import Tracker, TrackRule
-from uavexp.errors import require, require_non_negative, require_option, require_positive
 from uavexp.field import DistanceField
+from uavexp.parameters import Count, NonNegative, Positive, option
 from uavexp.types import Bodies, Limits, Scan, Tracks
 
 
-@dataclass(slots=True, kw_only=True)
-class Sensed:
+@option
+class Sensed(FilterParameters):
     """Movers told from the map by the scan alone; never looks at the truth."""
 
-    free_m: float = 0.2
-    memory_s: float = 0.5
-    cluster_m: float = 0.6
-    min_points: int = 3
-    max_size_m: float = 2.5
-    gate: float = 4.0
-    confirm_hits: int = 3
-    moved_m: float = 0.25
-    standing_mps: float = 0.12
-    standing_s: float = 1.0
-    coast_s: float = 3.0
-    max_speed_mps: float = 6.0
-    max_deviation_m: float = 2.0
-    position_noise_m: float = 0.08
-    acceleration_density: float = 0.1
-    adaptivity: float = 20.0
-    estimate: Estimate = Estimate.KALMAN
+    free_m: Positive = 0.2  # m, a return farther than this from every mapped obstacle is out of place:
+    # two voxels [ours]
+    memory_s: Positive = 0.5  # s, what was free so long ago (at most twice as long)
+    # still counts as free [ours]
+    cluster_m: Positive = 0.6  # m, returns so near to each other are of one body:
+    # two rings of the LiDAR at 10 m are 0.35 m apart [ours]
+    min_points: Count = 3  # returns that make a body [ours]
+    max_size_m: Positive = 2.5  # m, what is longer is no mover but a mistake of the map [ours]
+    gate: Positive = 4.0  # standard deviations between a track and what may be its observation [ours]
+    confirm_hits: Count = 3  # observations before a track may be moving [ours]
+    moved_m: Positive = 0.25  # m, from the place of its birth before a track is moving [ours]
+    standing_mps: NonNegative = 0.12  # m/s, slower is standing [ours]
+    standing_s: Positive = 1.0  # s, a mover that stood so long is given back to the map [ours]
+    coast_s: NonNegative = 3.0  # s, a mover that is hidden or out of view is predicted for so long [ours;
+    # paper: its horizon, 1.2]
+    max_speed_mps: Positive = 6.0  # m/s, a faster track has diverged [ours]
+    max_deviation_m: Positive = 2.0  # m, standard deviation of a position;
+    # a track less certain has diverged [ours]
     _tracker: Tracker | None = field(init=False, repr=False, default=None)
     _time_s: float = field(init=False, repr=False, default=np.nan)
     _before: tuple[DistanceField, DistanceField] | None = field(init=False, repr=False, default=None)
     _kept_s: float = field(init=False, repr=False, default=-np.inf)
-
-    def __post_init__(self) -> None:
-        require_positive(
-            free_m=self.free_m,
-            memory_s=self.memory_s,
-            cluster_m=self.cluster_m,
-            max_size_m=self.max_size_m,
-            gate=self.gate,
-            moved_m=self.moved_m,
-            standing_s=self.standing_s,
-            max_speed_mps=self.max_speed_mps,
-            max_deviation_m=self.max_deviation_m,
-            position_noise_m=self.position_noise_m,
-            acceleration_density=self.acceleration_density,
-        )
-        require_non_negative(standing_mps=self.standing_mps, coast_s=self.coast_s)
-        require(1.0 <= self.adaptivity < np.inf, f"adaptivity must be >= 1 and finite, got {self.adaptivity}")
-        self.estimate = require_option("estimate", self.estimate, Estimate)
-        for name in ("min_points", "confirm_hits"):
-            value = getattr(self, name)
-            require(isinstance(value, int) and value >= 1, f"{name} must be a whole number >= 1, got {value}")
 
     def reset(self, limits: Limits, rng: np.random.Generator) -> None:
         """Begin a trial with no track; draws nothing."""

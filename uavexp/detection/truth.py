@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from uavexp.bodies import present
 from uavexp.detection.returns import without_bodies
-from uavexp.errors import require_non_negative
 from uavexp.field import DistanceField
+from uavexp.parameters import NonNegative, option
 from uavexp.types import Bodies, Limits, Scan, Tracks
 
 
-@dataclass(slots=True, kw_only=True)
+@option
 class Truth:
     """Every body is known, whether it is in sight or not; returns within `margin_m` of one are its own."""
 
-    margin_m: float = 0.1
-
-    def __post_init__(self) -> None:
-        require_non_negative(margin_m=self.margin_m)
+    margin_m: NonNegative = 0.1  # m, returns so near to a mover are taken for its own:
+    # three sigma of the sensors' noise [ours]
 
     def reset(self, limits: Limits, rng: np.random.Generator) -> None:
         """Begin a trial; draws nothing."""

@@ -24,13 +24,14 @@ than `hysteresis`. Without it g* recedes with every scan, and "goal drift" means
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
+from typing import Annotated
 
 import numpy as np
 
 from uavexp.arrays import Bool, Float, Int32
-from uavexp.errors import require, require_non_negative, require_option, require_positive
+from uavexp.errors import require
 from uavexp.explorer.planar import (
     ascend,
     connected_components,
@@ -41,14 +42,8 @@ from uavexp.explorer.planar import (
 )
 from uavexp.explorer.view import Search, View, view_of
 from uavexp.mapping.projection import project
+from uavexp.parameters import Count, NonNegative, Positive, Unknown, Whole, between, option
 from uavexp.types import Goal, Limits, Observation
-
-
-class Unknown(StrEnum):
-    """Whether a path to a goal may cross unknown cells."""
-
-    OPTIMISTIC = "optimistic"
-    CONSERVATIVE = "conservative"
 
 
 class Clustering(StrEnum):
@@ -58,70 +53,51 @@ class Clustering(StrEnum):
     DBSCAN = "dbscan"
 
 
-@dataclass(slots=True, kw_only=True)
+@option
 class Frontier:
     """Frontier goals; see the module docstring for the score."""
 
-    rate_hz: float = 5.0
-    alpha: float = 0.005  # m per unknown cell
-    beta: float = 1.0
-    gamma: float = 1.0
-    neighbourhood_m: float = 1.0
-    clustering: Clustering = Clustering.COMPONENTS
-    min_cluster_cells: int = 5
-    max_cluster_m: float = 3.0
-    dbscan_radius_m: float = 0.3
-    dbscan_min_neighbours: int = 3
-    ascent_step_m: float = 0.1  # alpha_g
-    ascent_steps: int = 20
-    min_clearance_m: float = 0.3  # d_min
-    enough_clearance_m: float = 0.6
-    cell_m: float = 0.15
-    occupied_below_m: float = 0.3
-    unknown: Unknown = Unknown.OPTIMISTIC
-    unknown_cost: float = 1.5
-    band_below_m: float = 0.2
-    band_above_m: float = 0.2
-    min_distance_m: float = 0.8
-    commit_m: float = 0.8
-    hysteresis: float = 2.0
-    aside_radius_m: float = 0.3
-    escape_m: float = 0.6
-    set_aside_s: float = 10.0
+    rate_hz: Positive = 5.0  # Hz, goal rate [ours]
+    alpha: NonNegative = 0.005  # m per unknown cell: weight of J_info [ours]
+    beta: NonNegative = 1.0  # weight of the path length to the goal, J_cost [ours]
+    gamma: NonNegative = 1.0  # weight of the optimistic path from goal to target [ours];
+    # 0 is the paper's score
+    neighbourhood_m: Positive = 1.0  # m, radius of N(g) in J_info [ours]
+    clustering: Clustering = Clustering.COMPONENTS  # components | dbscan
+    min_cluster_cells: Count = 5  # smaller frontier clusters are ignored [ours]
+    max_cluster_m: Positive = 3.0  # m, longer clusters are split along their principal axis [ours]
+    dbscan_radius_m: Positive = 0.3  # m, neighbourhood of dbscan
+    dbscan_min_neighbours: Count = 3  # cells in it that make a core cell
+    ascent_step_m: Positive = 0.1  # m, alpha_g of x <- x + alpha_g grad ESDF [ours]
+    ascent_steps: Whole = 20  # at most so many ascent steps [ours]
+    min_clearance_m: Positive = 0.3  # m, d_min of goals and of cells a path may use [ours]
+    enough_clearance_m: Positive = 0.6  # m, the ascent stops here [ours]
+    cell_m: Positive = 0.15  # m, planar map
+    occupied_below_m: Positive = 0.3  # m, planar map: a seen cell is occupied below this clearance,
+    # else free [ours]
+    unknown: Unknown = Unknown.OPTIMISTIC  # optimistic: paths to goals may cross unknown cells |
+    # conservative: only known-free ones
+    unknown_cost: Annotated[float, between(1, 5)] = 1.5  # an unknown cell counts as so many free ones
+    # in J_cost [ours]
+    band_below_m: NonNegative = 0.2  # m, planar map takes the least clearance from so far below the
+    # flight height ...
+    band_above_m: NonNegative = 0.2  # m, ... to so far above it [ours];
+    # floor and ceiling stay out of the band
+    min_distance_m: NonNegative = 0.8  # m, nearer frontiers are no goals:
+    # the sensor cannot show more of them [ours]
+    commit_m: NonNegative = 0.8  # m, a goal is kept until it is so near; then it counts as visited [ours]
+    hysteresis: NonNegative = 2.0  # score by which another goal must win before that [ours]
+    aside_radius_m: Positive = 0.3  # m, goals so near to a visited or rejected one are set
+    # aside with it [ours]
+    escape_m: Positive = 0.6  # m, so near to the vehicle d_min is not asked of a path:
+    # it must find its way out [ours]
+    set_aside_s: NonNegative = 10.0  # s, visited and unreachable goals are set aside for so long [ours]
     _height_m: float = field(init=False, repr=False, default=0.0)
     _body_radius_m: float = field(init=False, repr=False, default=0.0)
     _current: Goal | None = field(init=False, repr=False, default=None)
     _aside: list[tuple[float, Float]] = field(init=False, repr=False, default_factory=list)
 
     def __post_init__(self) -> None:
-        self.clustering = require_option("clustering", self.clustering, Clustering)
-        self.unknown = require_option("unknown", self.unknown, Unknown)
-        require(1.0 <= self.unknown_cost <= 5.0, f"unknown_cost must be 1 to 5, got {self.unknown_cost}")
-        require_positive(
-            rate_hz=self.rate_hz,
-            neighbourhood_m=self.neighbourhood_m,
-            max_cluster_m=self.max_cluster_m,
-            dbscan_radius_m=self.dbscan_radius_m,
-            ascent_step_m=self.ascent_step_m,
-            min_clearance_m=self.min_clearance_m,
-            cell_m=self.cell_m,
-            occupied_below_m=self.occupied_below_m,
-            aside_radius_m=self.aside_radius_m,
-            escape_m=self.escape_m,
-        )
-        require_non_negative(
-            alpha=self.alpha,
-            beta=self.beta,
-            gamma=self.gamma,
-            band_below_m=self.band_below_m,
-            band_above_m=self.band_above_m,
-            min_distance_m=self.min_distance_m,
-            commit_m=self.commit_m,
-            hysteresis=self.hysteresis,
-            set_aside_s=self.set_aside_s,
-            ascent_steps=self.ascent_steps,
-        )
-        require(self.min_cluster_cells >= 1, f"min_cluster_cells must be >= 1, got {self.min_cluster_cells}")
         require(
             self.enough_clearance_m >= self.min_clearance_m,
             f"enough_clearance_m must be >= min_clearance_m = {self.min_clearance_m},"

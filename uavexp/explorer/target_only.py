@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from uavexp.arrays import Float
-from uavexp.errors import require_non_negative, require_positive
+from uavexp.parameters import NonNegative, Positive, option
 from uavexp.types import Goal, Limits, Observation
 
 
-@dataclass(slots=True, kw_only=True)
+@option
 class TargetOnly:
     """The target, until it is rejected; then again after `set_aside_s`."""
 
-    rate_hz: float = 5.0
-    set_aside_s: float = 1.0
+    rate_hz: Positive = 5.0  # Hz, goal rate
+    set_aside_s: NonNegative = 1.0  # s, after a failed plan the target is not tried again for so long [ours]
     _until_s: float = field(init=False, repr=False, default=-1.0)
-
-    def __post_init__(self) -> None:
-        require_positive(rate_hz=self.rate_hz)
-        require_non_negative(set_aside_s=self.set_aside_s)
 
     def reset(self, flight_height_m: float, limits: Limits) -> None:
         """Begin a trial."""

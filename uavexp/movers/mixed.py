@@ -11,15 +11,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
+from typing import Annotated
 
 import numpy as np
 
 from uavexp.arrays import Float, UInt8
-from uavexp.errors import WorldError, require, require_non_negative, require_positive
+from uavexp.errors import WorldError, require
 from uavexp.movers.motion import POSITION, REST, WAY, Mode, advance, is_blocked
 from uavexp.movers.placing import Air
 from uavexp.movers.timeline import Timeline, row_of
+from uavexp.parameters import NonNegative, Positive, PositiveShare, Range, Share, between, option
 from uavexp.scene import Scene
 from uavexp.types import Bodies, Limits, Shape, World
 
@@ -28,25 +30,28 @@ _ATTEMPTS = 300  # drawings of a mover before giving up
 _CIRCLE_STEP_M = 0.05  # between the places of a circle that are tested
 
 
-@dataclass(slots=True, kw_only=True)
+@option
 class Mixed:
     """Linear, circular and accelerated movers: spheres, people and boxes."""
 
-    count: int = 8
-    speed_mps: Sequence[float] = (0.4, 1.5)
-    linear_share: float = 0.5
-    circular_share: float = 0.25
-    sphere_share: float = 0.3
-    person_share: float = 0.4
-    sphere_radius_m: Sequence[float] = (0.15, 0.35)
-    person_radius_m: Sequence[float] = (0.22, 0.30)
-    person_height_m: float = 1.7
-    box_width_m: Sequence[float] = (0.3, 0.8)
-    box_height_m: Sequence[float] = (0.8, 1.8)
-    circle_radius_m: Sequence[float] = (0.6, 2.0)
-    period_s: Sequence[float] = (2.0, 5.0)
-    restitution: float = 0.9
-    start_margin_m: float = 0.75
+    count: Annotated[int, between(1, 200)] = 8  # movers; issue: "the closed loop with 8 movers" [ours]
+    speed_mps: Range = (0.4, 1.5)  # m/s, least and greatest speed; a brisk walk,
+    # well below the vehicle's 2.5 m/s [ours]
+    linear_share: Share = 0.5  # of movers that go straight and rebound, damped [ours]
+    circular_share: Share = 0.25  # of movers on a circle; the rest go straight with changing speed [ours]
+    sphere_share: Share = 0.3  # of flying spheres [ours]
+    person_share: Share = 0.4  # of people, upright cylinders; the rest are boxes on the floor [ours]
+    sphere_radius_m: Range = (0.15, 0.35)  # m [ours]
+    person_radius_m: Range = (0.22, 0.30)  # m [ours]
+    person_height_m: Positive = 1.7  # m [ours]
+    box_width_m: Range = (0.3, 0.8)  # m, of each side [ours]
+    box_height_m: Range = (0.8, 1.8)  # m [ours]
+    circle_radius_m: Range = (0.6, 2.0)  # m [ours]
+    period_s: Range = (2.0, 5.0)  # s, of the speed of accelerated movers [ours]
+    restitution: PositiveShare = 0.9  # share of its speed into a surface that a linear mover keeps;
+    # paper 2: "damped" [ours]
+    start_margin_m: NonNegative = 0.75  # m beyond the vehicle's stopping distance that no mover
+    # starts within [ours]
     _scene: Scene = field(init=False, repr=False)
     _bounds_m: tuple[Float, Float] = field(init=False, repr=False)  # (B, 3) of the centres, each
     _mode: UInt8 = field(init=False, repr=False)
@@ -54,28 +59,9 @@ class Mixed:
     _timeline: Timeline = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Check every parameter."""
-        whole = isinstance(self.count, int) and not isinstance(self.count, bool)
-        require(whole and 1 <= self.count <= 200, f"count must be 1 to 200, got {self.count}")
-        ranges = (
-            "speed_mps", "sphere_radius_m", "person_radius_m", "box_width_m", "box_height_m",
-            "circle_radius_m", "period_s",
-        )  # fmt: skip
-        for name in ranges:
-            pair = [float(value) for value in getattr(self, name)]
-            require(len(pair) == 2, f"{name} must be [least, greatest], got {pair}")
-            require_positive(**{f"{name}[0]": pair[0], f"{name}[1]": pair[1]})
-            require(pair[0] <= pair[1], f"{name} must be [least, greatest], got {pair}")
-        require_positive(person_height_m=self.person_height_m)
-        require_non_negative(start_margin_m=self.start_margin_m)
-        require(0.0 < self.restitution <= 1.0, f"restitution must be > 0 and <= 1, got {self.restitution}")
-        pairs = (("linear_share", "circular_share"), ("sphere_share", "person_share"))
-        for names in pairs:
-            shares = [getattr(self, name) for name in names]
-            require(
-                min(shares) >= 0.0 and sum(shares) <= 1.0 + 1e-9,
-                f"{names[0]} and {names[1]} must be >= 0 with a sum <= 1, got {shares[0]} and {shares[1]}",
-            )
+        for one, other in (("linear_share", "circular_share"), ("sphere_share", "person_share")):
+            sum_ = getattr(self, one) + getattr(self, other)
+            require(sum_ <= 1.0 + 1e-9, f"{one} and {other} must have a sum <= 1, got {sum_:g}")
 
     def reset(self, world: World, scene: Scene, limits: Limits, rng: np.random.Generator) -> None:
         """Begin a trial: draw all movers.
@@ -132,7 +118,7 @@ class Mixed:
         shape, half, position, velocity = self._timeline
         more_m, more_mps = np.empty((_CHUNK, self.count, 3)), np.empty((_CHUNK, self.count, 3))
         advance(
-            self._scene.grid, *self._bounds_m, self._mode, half, float(self.restitution),
+            self._scene.grid, *self._bounds_m, self._mode, half, self.restitution,
             self._state, position.shape[0], more_m, more_mps,
         )  # fmt: skip
         self._timeline = Timeline(

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from uavexp.parameters import option
 from uavexp.scene import Scene
 from uavexp.types import Bodies, Limits, World
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@option
 class NoMovers:
     """No body at all."""
 

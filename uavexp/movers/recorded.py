@@ -15,61 +15,50 @@ After `duration_s` the recording begins anew.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
+from typing import Annotated, Literal
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from uavexp.arrays import Bool, Float
 from uavexp.bodies import ABSENT_M
-from uavexp.errors import WorldError, require, require_non_negative, require_positive
+from uavexp.errors import WorldError
 from uavexp.movers.placing import FLOOR_GAP_M, Air
 from uavexp.movers.timeline import ROW_S, Timeline, row_of
 from uavexp.movers.tracks_file import read_tracks
+from uavexp.parameters import Constraint, Finite, NonNegative, Positive, between, option
 from uavexp.scene import Scene
 from uavexp.types import Bodies, Limits, Shape, World
 
 _TEST_ROWS = 10  # between the places that are tested for room
 
 
-@dataclass(slots=True, kw_only=True)
+@option
 class Recorded:
     """Recorded tracks of people, at true speed unless scaled."""
 
-    path: str
-    scale: float = 1.0
-    begin_s: float | None = None
-    quarter_turns: int | None = None
-    duration_s: float = 120.0
-    longest_gap_s: float = 1.0
-    radius_m: float = 0.25
-    height_m: float = 1.7
-    start_margin_m: float = 0.75
-    settled_s: float = 3.0
+    path: Annotated[
+        str, Constraint("a csv file with columns t_s, id, x_m, y_m", bool)
+    ]  # csv file with columns
+    # t_s, id, x_m, y_m: s, a person's name, m, m
+    scale: Positive = 1.0  # of the recorded places; below 1 people are slower too [ours]
+    begin_s: Finite | None = None  # s, of the recording's own clock, where the flight begins;
+    # null: by seed [ours]
+    quarter_turns: Literal[0, 1, 2, 3] | None = None  # 0 | 1 | 2 | 3, how the recording is turned;
+    # null: by seed [ours]
+    duration_s: Annotated[float, between(ROW_S, 3600)] = 120.0  # s of the recording, after which it
+    # begins anew [ours]
+    longest_gap_s: Positive = 1.0  # s; a longer gap between two samples is not bridged:
+    # the person is absent [ours]
+    radius_m: Positive = 0.25  # m, of a person [ours]
+    height_m: Positive = 1.7  # m, of a person [ours]
+    start_margin_m: NonNegative = 0.75  # m beyond the vehicle's stopping distance within which nobody
+    # is at first [ours]
+    settled_s: NonNegative = 3.0  # s, how long "at first" is: hovering,
+    # planning and turning before the vehicle goes [ours]
     _timeline: Timeline = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        """Check every parameter."""
-        require(bool(self.path), "movers.path must be given: a csv file with columns t_s, id, x_m, y_m")
-        require_positive(
-            scale=self.scale,
-            duration_s=self.duration_s,
-            longest_gap_s=self.longest_gap_s,
-            radius_m=self.radius_m,
-            height_m=self.height_m,
-        )
-        require_non_negative(start_margin_m=self.start_margin_m, settled_s=self.settled_s)
-        require(
-            ROW_S <= self.duration_s <= 3600.0,
-            f"duration_s must be {ROW_S:g} to 3600 s, got {self.duration_s}",
-        )
-        if self.begin_s is not None:
-            require(math.isfinite(self.begin_s), f"begin_s must be finite or null, got {self.begin_s}")
-        require(
-            self.quarter_turns in (None, 0, 1, 2, 3),
-            f"quarter_turns must be 0, 1, 2, 3 or null, got {self.quarter_turns}",
-        )
 
     def reset(self, world: World, scene: Scene, limits: Limits, rng: np.random.Generator) -> None:
         """Begin a trial: place the recording in the room.

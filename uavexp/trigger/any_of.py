@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import field
+from typing import ClassVar
 
 from uavexp.errors import require
 from uavexp.field import DistanceField
+from uavexp.parameters import option
 from uavexp.trajectory import Trajectory
 from uavexp.trigger.base import TriggerPolicy
 from uavexp.types import Decision, Limits, Observation
 
 
-@dataclass(slots=True, kw_only=True)
+@option
 class AnyOf:
     """Asks every policy at every check; the first in order that fires names the cause."""
 
-    policies: dict[str, TriggerPolicy]
+    defaults_list: ClassVar[tuple[str, ...]] = ("risk@policies.risk", "mcr@policies.mcr")  # Each policy
+    # keeps its own parameters: trigger.policies.risk.margin_m=0.3
+    policies: dict[str, TriggerPolicy] = field(default_factory=dict)  # name -> policy, filled by the
+    # defaults above; the first in order that fires names the cause
 
     def __post_init__(self) -> None:
         require(len(self.policies) > 0, "policies must name one policy or more, got none")

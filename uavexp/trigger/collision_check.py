@@ -8,26 +8,24 @@ clearance that the plan was made with.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
-from uavexp.errors import require_positive
 from uavexp.field import DistanceField
+from uavexp.parameters import Positive, option
 from uavexp.trajectory import Trajectory
 from uavexp.trigger.validity import clearance_ahead_m, comes_near, ends_within, is_flown
 from uavexp.types import Decision, Limits, Observation
 
 
-@dataclass(slots=True, kw_only=True)
+@option
 class CollisionCheck:
     """Replans when the path within `horizon_s` is nearer than `clearance_m`, and before a frontier."""
 
-    clearance_m: float = 0.23
-    horizon_s: float = 10.0
-    arrival_s: float = 0.5
+    clearance_m: Positive = 0.23  # m, least mapped distance ahead: the body's circle is 0.226 m;
+    # must stay below planner.min_clearance_m [ours]
+    horizon_s: Positive = 10.0  # s, looks so far ahead: in practice the whole trajectory, as FUEL and Nav2 do
+    arrival_s: Positive = 0.5  # s, also replan so long before a frontier is reached (FUEL's thresh_replan1)
     _trajectory: Trajectory | None = field(init=False, repr=False, default=None)
-
-    def __post_init__(self) -> None:
-        require_positive(clearance_m=self.clearance_m, horizon_s=self.horizon_s, arrival_s=self.arrival_s)
 
     def reset(self, limits: Limits) -> None:
         """Begin a trial."""

@@ -7,13 +7,13 @@ et al. 2020) is this policy for ground robots.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
-from uavexp.errors import require_positive
 from uavexp.field import DistanceField
 from uavexp.geometry import polyline_length_m
+from uavexp.parameters import Positive, option
 from uavexp.trajectory import Trajectory, evaluate
 from uavexp.trigger.validity import ends_within, is_flown
 from uavexp.types import Decision, Limits, Observation
@@ -21,16 +21,14 @@ from uavexp.types import Decision, Limits, Observation
 _SAMPLE_S = 0.02  # at 2.5 m/s half a voxel
 
 
-@dataclass(slots=True, kw_only=True)
+@option
 class Distance:
     """Replans once `distance_m` of the plan are flown, and `arrival_s` before a frontier."""
 
-    distance_m: float = 1.0
-    arrival_s: float = 0.5
+    distance_m: Positive = 1.0  # m, flown along a plan before the next; Nav2's DistanceController example
+    arrival_s: Positive = 0.5  # s, also replan so long before a frontier is reached
+    # (FUEL's thresh_replan1) [ours]
     _trajectory: Trajectory | None = field(init=False, repr=False, default=None)
-
-    def __post_init__(self) -> None:
-        require_positive(distance_m=self.distance_m, arrival_s=self.arrival_s)
 
     def reset(self, limits: Limits) -> None:
         """Begin a trial."""

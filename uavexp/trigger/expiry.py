@@ -6,31 +6,29 @@ and GlobalUpdatedGoal, any of which asks for a new path.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
-from uavexp.errors import require_non_negative, require_positive
 from uavexp.field import DistanceField
+from uavexp.parameters import NonNegative, Positive, option
 from uavexp.trajectory import Trajectory
 from uavexp.trigger.validity import clearance_ahead_m, comes_near, ends_within, is_flown, is_older
 from uavexp.types import Decision, Limits, Observation
 
 
-@dataclass(slots=True, kw_only=True)
+@option
 class Expiry:
     """Replans when the plan is invalid, expired or its goal replaced, and before a frontier."""
 
-    expiry_s: float = 10.0
-    clearance_m: float = 0.23
-    horizon_s: float = 10.0
-    goal_updated: bool = True
-    arrival_s: float = 0.5
+    expiry_s: Positive = 10.0  # s, a plan that old is replaced (PathExpiringTimer; 10 s in Nav2's tree)
+    clearance_m: NonNegative = 0.23  # m, least mapped distance ahead (IsPathValid):
+    # the body's circle is 0.226 m [ours]; 0: validity is not asked
+    horizon_s: Positive = 10.0  # s, the validity check looks so far ahead: in practice the whole trajectory
+    goal_updated: bool = True  # whether another goal g* asks for a plan (GoalUpdated)
+    arrival_s: Positive = 0.5  # s, also replan so long before a frontier is reached
+    # (FUEL's thresh_replan1) [ours]
     _trajectory: Trajectory | None = field(init=False, repr=False, default=None)
-
-    def __post_init__(self) -> None:
-        require_positive(expiry_s=self.expiry_s, horizon_s=self.horizon_s, arrival_s=self.arrival_s)
-        require_non_negative(clearance_m=self.clearance_m)
 
     def reset(self, limits: Limits) -> None:
         """Begin a trial."""

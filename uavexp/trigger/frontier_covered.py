@@ -16,10 +16,10 @@ gone" rule of next-best-view planners (Bircher et al. 2016).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
-from uavexp.errors import require, require_non_negative, require_positive
 from uavexp.field import DistanceField
+from uavexp.parameters import NonNegative, Positive, PositiveShare, option
 from uavexp.trajectory import Trajectory
 from uavexp.trigger.validity import (
     clearance_ahead_m,
@@ -32,29 +32,22 @@ from uavexp.trigger.validity import (
 from uavexp.types import Decision, Limits, Observation
 
 
-@dataclass(slots=True, kw_only=True)
+@option
 class FrontierCovered:
     """Replans when the frontier is covered, on a collision ahead, on arrival, and by the clock."""
 
-    covered_share: float = 0.2
-    neighbourhood_m: float = 1.0
-    min_age_s: float = 0.5
-    period_s: float = 1.5
-    clearance_m: float = 0.23
-    horizon_s: float = 10.0
-    arrival_s: float = 0.5
+    covered_share: PositiveShare = 0.2  # 1, replan when more than this share of the unknown around the goal
+    # has been seen since the plan (FUEL's min_view_finish_fraction); 1: never
+    neighbourhood_m: Positive = 1.0  # m, radius around the goal; that of J_info in explorer=frontier [ours]
+    min_age_s: NonNegative = 0.5  # s, a younger plan is not given up for being covered
+    # (FUEL's thresh_replan2)
+    period_s: NonNegative = 1.5  # s, a plan that old is replaced anyway (FUEL's thresh_replan3); 0: never
+    clearance_m: NonNegative = 0.23  # m, least mapped distance ahead (FUEL inflates by its radius):
+    # the body's circle is 0.226 m [ours]; 0: no collision check
+    horizon_s: Positive = 10.0  # s, the collision check looks so far ahead: in practice the whole trajectory
+    arrival_s: Positive = 0.5  # s, replan so long before a frontier is reached (FUEL's thresh_replan1)
     _trajectory: Trajectory | None = field(init=False, repr=False, default=None)
     _at_plan: DistanceField | None = field(init=False, repr=False, default=None)
-
-    def __post_init__(self) -> None:
-        require(
-            0.0 < self.covered_share <= 1.0,
-            f"covered_share must be > 0 and <= 1 (1: never), got {self.covered_share}",
-        )
-        require_positive(
-            neighbourhood_m=self.neighbourhood_m, horizon_s=self.horizon_s, arrival_s=self.arrival_s
-        )
-        require_non_negative(min_age_s=self.min_age_s, period_s=self.period_s, clearance_m=self.clearance_m)
 
     def reset(self, limits: Limits) -> None:
         """Begin a trial."""

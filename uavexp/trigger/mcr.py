@@ -19,14 +19,14 @@ further ahead keeps accumulating until it matters, and is then answered by one r
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 
 import numpy as np
 
 from uavexp.arrays import Float, Int32
-from uavexp.errors import require, require_non_negative, require_option, require_positive
 from uavexp.field import DistanceField
+from uavexp.parameters import Count, NonNegative, Positive, option
 from uavexp.trajectory import Trajectory, evaluate, sample_times
 from uavexp.trigger.change import changed_near
 from uavexp.types import Decision, Goal, Limits, Observation
@@ -74,23 +74,30 @@ class Sign(StrEnum):
 _NO_VOXELS = np.zeros(0, dtype=np.int32)
 
 
-@dataclass(slots=True, kw_only=True)
+@option
 class Mcr:
     """The MCR policy; every reading of the paper is a parameter."""
 
-    delta_map_m: float = 0.15
-    delta_goal_m: float = 0.3
-    monitor_radius_m: float = 2.0
-    judge: Judge = Judge.PATH
-    since: Since = Since.PLAN
-    goal_since: Since = Since.PLAN
-    extent: Extent = Extent.REMAINING
-    first_sight: FirstSight = FirstSight.OCCUPIED
-    sign: Sign = Sign.CONTRACTION
-    min_changed_voxels: int = 1
-    valid_clearance_m: float = 0.4
-    horizon_s: float = 1.0
-    min_interval_s: float = 0.0
+    delta_map_m: Positive = 0.15  # m, map-change threshold (paper)
+    delta_goal_m: Positive = 0.3  # m, goal-drift threshold (paper)
+    monitor_radius_m: Positive = 2.0  # m, r_mon (paper); judge=path: only which voxels the log names;
+    # <= mapping.max_distance_m
+    judge: Judge = Judge.PATH  # path: the change at the trajectory's own points [ours] | region: equation
+    # (20) within r_mon
+    since: Since = Since.PLAN  # plan: accumulated since the plan was made (§4.5) | update:
+    # between consecutive updates (eq. 20)
+    goal_since: Since = Since.PLAN  # plan: g* against the goal flown to | update:
+    # g* between consecutive checks (the paper's)
+    extent: Extent = Extent.REMAINING  # remaining | whole trajectory
+    first_sight: FirstSight = FirstSight.OCCUPIED  # judge=region, voxels first seen: none | occupied (§4.4:
+    # newly observed obstacles) | all count as changed
+    sign: Sign = Sign.CONTRACTION  # contraction of free space only (§3.4) | both
+    min_changed_voxels: Count = 1  # judge=region: at least so many changed voxels
+    valid_clearance_m: Positive = 0.4  # m, judge=path: a plan is valid while its clearance stays
+    # above this [ours]
+    horizon_s: Positive = 1.0  # s, judge=path: a violation counts when it is reached within this time:
+    # stopping from 2.5 m/s takes 1.2 s, swerving less [ours]
+    min_interval_s: NonNegative = 0.0  # s, least time between replans
     _touch_m: float = field(init=False, repr=False, default=0.0)
     _trajectory: Trajectory | None = field(init=False, repr=False, default=None)
     _at_plan: DistanceField | None = field(init=False, repr=False, default=None)
@@ -99,25 +106,6 @@ class Mcr:
     _times_s: Float = field(init=False, repr=False, default_factory=lambda: np.zeros(0))
     _clearance_m: Float = field(init=False, repr=False, default_factory=lambda: np.zeros(0))
     _previous_goal: Goal | None = field(init=False, repr=False, default=None)
-
-    def __post_init__(self) -> None:
-        self.judge = require_option("judge", self.judge, Judge)
-        self.since = require_option("since", self.since, Since)
-        self.goal_since = require_option("goal_since", self.goal_since, Since)
-        self.extent = require_option("extent", self.extent, Extent)
-        self.first_sight = require_option("first_sight", self.first_sight, FirstSight)
-        self.sign = require_option("sign", self.sign, Sign)
-        require_positive(
-            delta_map_m=self.delta_map_m,
-            delta_goal_m=self.delta_goal_m,
-            monitor_radius_m=self.monitor_radius_m,
-            valid_clearance_m=self.valid_clearance_m,
-            horizon_s=self.horizon_s,
-        )
-        require_non_negative(min_interval_s=self.min_interval_s)
-        require(
-            self.min_changed_voxels >= 1, f"min_changed_voxels must be >= 1, got {self.min_changed_voxels}"
-        )
 
     def reset(self, limits: Limits) -> None:
         """Begin a trial."""

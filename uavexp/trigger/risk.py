@@ -31,15 +31,15 @@ the vehicle. Readings:
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 
 import numba as nb
 import numpy as np
 
 from uavexp.arrays import Float
-from uavexp.errors import require_non_negative, require_option, require_positive
 from uavexp.field import DistanceField
+from uavexp.parameters import NonNegative, Positive, option
 from uavexp.planner.movers.moving import box_gap
 from uavexp.trajectory import Trajectory, evaluate
 from uavexp.types import Decision, Limits, Observation
@@ -109,27 +109,25 @@ def approaches(
     return found
 
 
-@dataclass(slots=True, kw_only=True)
+@option
 class Risk:
     """Replans when the flown path and a mover's predicted path come too near to each other."""
 
-    horizon_s: float = 1.2
-    margin_m: float = 0.5
-    speed_s: float = 0.2
-    instant: Instant = Instant.SAME
-    speed: Speed = Speed.CLOSING
-    radii: Radii = Radii.BOTH
-    min_interval_s: float = 0.3
+    horizon_s: Positive = 1.2  # s, t_th: path and prediction are compared so far ahead (paper 2)
+    margin_m: NonNegative = 0.5  # m, delta (paper 2); planner.mover_margin_m is the same,
+    # so a new plan clears the event, unless the mover turns at a wall
+    speed_s: NonNegative = 0.2  # s, safe distance per speed; the paper's is t_th, 1.2 s, which no plan clears
+    # [ours: a check, the latency, the onset of a turn]
+    instant: Instant = Instant.SAME  # same: at the same instant [ours] | any:
+    # wherever the paths come near (eq. 4-3)
+    speed: Speed = Speed.CLOSING  # closing: what the distance shrinks by [ours] | relative:
+    # the norm of v_rel (eq. 4-2)
+    radii: Radii = Radii.BOTH  # both: the vehicle's radius, too [ours] | mover (eq. 4-2)
+    min_interval_s: NonNegative = 0.3  # s, between two events: a risk that no plan clears does not fire at
+    # every check [ours]
     _radius_m: float = field(init=False, repr=False, default=0.0)
     _trajectory: Trajectory | None = field(init=False, repr=False, default=None)
     _fired_s: float = field(init=False, repr=False, default=-math.inf)
-
-    def __post_init__(self) -> None:
-        self.instant = require_option("instant", self.instant, Instant)
-        self.speed = require_option("speed", self.speed, Speed)
-        self.radii = require_option("radii", self.radii, Radii)
-        require_positive(horizon_s=self.horizon_s)
-        require_non_negative(margin_m=self.margin_m, speed_s=self.speed_s, min_interval_s=self.min_interval_s)
 
     def reset(self, limits: Limits) -> None:
         """Begin a trial."""

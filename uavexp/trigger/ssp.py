@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from uavexp.field import DistanceField
+from uavexp.parameters import option
 from uavexp.trajectory import Trajectory
 from uavexp.types import Decision, Limits, Observation
 
 
-@dataclass(slots=True, kw_only=True)
+@option
 class Ssp:
     """Never replans."""
 

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 
-from uavexp.errors import require_positive
 from uavexp.field import DistanceField
+from uavexp.parameters import Positive, option
 from uavexp.trajectory import Trajectory
 from uavexp.types import Decision, Limits, Observation
 
 
-@dataclass(slots=True, kw_only=True)
+@option
 class Tbr:
     """Replans on the first check at or after each multiple of `interval_s`."""
 
-    interval_s: float = 5.0
+    interval_s: Positive = 5.0  # s, T_int; not given in the paper: 72.3 s / 14.6 replans is about 5 s
     _ticks: int = field(init=False, repr=False, default=0)
-
-    def __post_init__(self) -> None:
-        require_positive(interval_s=self.interval_s)
 
     def reset(self, limits: Limits) -> None:
         """Begin a trial; the clock starts with it."""

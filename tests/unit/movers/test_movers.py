@@ -294,7 +294,7 @@ def test_bad_files_and_missing_people_are_refused(tmp_path, room):
         begin(Recorded(path=str(tmp_path / "none.csv")), room)
     with pytest.raises(WorldError, match="nobody of"):
         begin(Recorded(path=recording(tmp_path, *CORNERS), begin_s=1000.0), room)
-    with pytest.raises(ConfigError, match="path must be given"):
+    with pytest.raises(ConfigError, match="path must be a csv file with columns"):
         Recorded(path="")
 
 
