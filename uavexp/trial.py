@@ -17,7 +17,7 @@ from uavexp.geometry import quaternion_from_yaw
 from uavexp.mapping.base import MapBackend
 from uavexp.mission.base import Mission
 from uavexp.movers.base import Movers
-from uavexp.pilot import Pilot
+from uavexp.pilot.base import Crew, Pilot, Piloting
 from uavexp.planner.base import Planner
 from uavexp.recorder import Recorder, Stopwatch, seen_share
 from uavexp.safety.base import Safety
@@ -50,33 +50,19 @@ class Parts:
     movers: Movers
     detection: Detection
     mission: Mission
+    pilot: Pilot
     world_seed: int | None = None  # of the layout alone; None: the trial's seed
     step_s: float = 0.01
     latency_s: float = 0.03
     start_bubble_m: float = 0.6
-    settle_s: float = 0.5
-    restart_error_m: float = 0.4
     stuck_s: float = 20.0
-    goals_per_request: int = 3
-    look_around_radps: float = 0.8
-    turn_first_rad: float = 0.6
-    yaw_lookahead_s: float = 0.8
 
     def __post_init__(self) -> None:
         require_positive(step_s=self.step_s, stuck_s=self.stuck_s)
-        require_non_negative(
-            latency_s=self.latency_s,
-            start_bubble_m=self.start_bubble_m,
-            settle_s=self.settle_s,
-            restart_error_m=self.restart_error_m,
-            yaw_lookahead_s=self.yaw_lookahead_s,
-            look_around_radps=self.look_around_radps,
-            turn_first_rad=self.turn_first_rad,
-        )
+        require_non_negative(latency_s=self.latency_s, start_bubble_m=self.start_bubble_m)
         require(
             self.world_seed is None or self.world_seed >= 0, f"world_seed must be >= 0, got {self.world_seed}"
         )
-        require(self.goals_per_request >= 1, f"goals_per_request must be >= 1, got {self.goals_per_request}")
         steps_per(self.step_s, "latency_s", self.latency_s)
         for name, rate_hz in self.rates_hz().items():
             steps = steps_per(self.step_s, f"1 / {name}", 1.0 / rate_hz)
@@ -128,7 +114,7 @@ def fly(parts: Parts, world: World, seed: int, progress: Progress | None = None)
     watch, recorder = Stopwatch(), Recorder()
     estimate = state = _hover(world)
     contact = ContactTracker(scene=scene, body_size_m=parts.vehicle.limits.body_size_m)
-    pilot = _reset(parts, world, scene, state, seed, watch)
+    pilot = _begin(parts, world, scene, state, seed, watch)
     period = {name: steps_per(parts.step_s, name, 1.0 / rate) for name, rate in parts.rates_hz().items()}
     last_step = math.ceil(parts.mission.time_limit_s / parts.step_s)
     stuck_steps = math.ceil(parts.stuck_s / parts.step_s)
@@ -150,10 +136,10 @@ def fly(parts: Parts, world: World, seed: int, progress: Progress | None = None)
         if step % period["mapping.esdf_rate_hz"] == 0:
             with watch.lap("esdf"):
                 update = parts.mapping.update(time_s)
-        observation = _observe(parts, pilot, time_s, estimate, reference, update, tracks)
+        observation = _observe(parts, world, pilot, time_s, estimate, reference, update, tracks)
         if step % period["explorer.rate_hz"] == 0:
             pilot.explore(observation)
-            observation = _observe(parts, pilot, time_s, estimate, reference, update, tracks)
+            observation = _observe(parts, world, pilot, time_s, estimate, reference, update, tracks)
         if step % period["mapping.esdf_rate_hz"] == 0:
             recorder.tick(observation, pilot.decide(observation))
         if step % period["controller.rate_hz"] == 0:
@@ -189,7 +175,7 @@ def _hover(world: World) -> State:
     )
 
 
-def _reset(parts: Parts, world: World, scene: Scene, start: State, seed: int, watch: Stopwatch) -> Pilot:
+def _begin(parts: Parts, world: World, scene: Scene, start: State, seed: int, watch: Stopwatch) -> Piloting:
     """Give every part its trial's context and its own random stream."""
     limits = parts.vehicle.limits
     parts.movers.reset(world, scene, limits, generator(seed, Stream.MOVERS))
@@ -207,30 +193,25 @@ def _reset(parts: Parts, world: World, scene: Scene, start: State, seed: int, wa
         parts.mission.reset(world, scene, limits)
     guide = parts.mission.guide(parts.explorer)
     guide.reset(float(world.start_m[2]), limits)
-    return Pilot(
+    crew = Crew(
         explorer=guide,
         trigger=parts.trigger,
         planner=parts.planner,
         safety=parts.safety,
         limits=limits,
-        watch=watch,
         latency_s=parts.latency_s,
-        settle_s=parts.settle_s,
-        restart_error_m=parts.restart_error_m,
-        goals_per_request=parts.goals_per_request,
-        look_around_radps=parts.look_around_radps,
-        turn_first_rad=parts.turn_first_rad,
-        yaw_lookahead_s=parts.yaw_lookahead_s,
-        yaw_rate_radps=0.9 * limits.max_body_rate_radps,
+        start_m=world.start_m.copy(),
+        start_yaw_rad=world.start_yaw_rad,
         flight_bounds_m=world.flight_bounds_m,
-        hover_m=world.start_m.copy(),
-        yaw_rad=world.start_yaw_rad,
+        watch=watch,
     )
+    return parts.pilot.begin(crew)
 
 
 def _observe(
     parts: Parts,
-    pilot: Pilot,
+    world: World,
+    pilot: Piloting,
     time_s: float,
     estimate: State,
     reference: Reference,
@@ -247,7 +228,7 @@ def _observe(
         goal=pilot.goal,
         best_goal=pilot.best_goal,
         target_m=parts.mission.target_m,
-        flight_bounds_m=pilot.flight_bounds_m,
+        flight_bounds_m=world.flight_bounds_m,
         tracks=tracks,
     )
 
@@ -256,7 +237,7 @@ def _log(
     parts: Parts,
     world: World,
     scene: Scene,
-    pilot: Pilot,
+    pilot: Piloting,
     recorder: Recorder,
     contact: ContactTracker,
     outcome: Outcome,
@@ -282,7 +263,7 @@ def _log(
     )
 
 
-def _reason(parts: Parts, pilot: Pilot, outcome: Outcome) -> str:
+def _reason(parts: Parts, pilot: Piloting, outcome: Outcome) -> str:
     if outcome in (Outcome.REACHED, Outcome.EXPLORED, Outcome.INSPECTED):
         return ""
     if outcome is Outcome.TIMEOUT:

@@ -36,5 +36,5 @@ def test_a_preset_has_the_last_word_on_what_it_sets(name: str) -> None:
 
 
 def test_what_is_typed_beats_the_preset() -> None:
-    (cell,) = Composer().command(parse_settings(["strategy=risk", "turn_first_rad=1.5"])).cells
-    assert cell.config["turn_first_rad"] == 1.5
+    (cell,) = Composer().command(parse_settings(["strategy=risk", "pilot.turn_first_rad=1.5"])).cells
+    assert cell.config["pilot"]["turn_first_rad"] == 1.5

@@ -62,9 +62,9 @@ def test_every_combination_is_a_cell_with_its_place_on_every_axis(composer: Comp
 
 
 def test_what_is_typed_replaces_where_it_is_set_and_else_holds_everywhere(composer: Composer) -> None:
-    replaced = cells(composer, "trigger.interval_s=3", "settle_s=0.7", "latency_s=0.01")
+    replaced = cells(composer, "trigger.interval_s=3", "pilot.settle_s=0.7", "latency_s=0.01")
     assert [config["trigger"].get("interval_s") for _, config in replaced] == [3.0, 3.0, None, None]
-    assert {config["settle_s"] for _, config in replaced} == {0.7}
+    assert {config["pilot"]["settle_s"] for _, config in replaced} == {0.7}
     assert {config["latency_s"] for _, config in replaced} == {0.01}
     assert all("setting" not in labels for labels, _ in replaced)  # nothing is swept any more
 

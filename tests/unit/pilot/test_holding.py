@@ -12,7 +12,8 @@ from uavexp.braking import stopping_distance_m, with_stop
 from uavexp.check.fields import box, empty, field_from
 from uavexp.explorer.target_only import TargetOnly
 from uavexp.field import DistanceField
-from uavexp.pilot import Pilot
+from uavexp.pilot.base import Crew
+from uavexp.pilot.holding import Holding, HoldingPilot
 from uavexp.planner.min_acc import MinAcc
 from uavexp.recorder import Stopwatch
 from uavexp.safety.brake import Brake
@@ -34,13 +35,15 @@ def room(*, walled: bool = False) -> DistanceField:
     return field_from(grid)
 
 
-def make(trigger: Tbr | Ssp | Mcr, safety: NoBrake | Brake | None = None, latency_s: float = 0.03) -> Pilot:
+def make(
+    trigger: Tbr | Ssp | Mcr, safety: NoBrake | Brake | None = None, latency_s: float = 0.03
+) -> HoldingPilot:
     planner, explorer, safety = MinAcc(), TargetOnly(), safety or NoBrake()
     planner.reset(LIMITS, np.random.default_rng(0))
     explorer.reset(1.0, LIMITS)
     trigger.reset(LIMITS)
     safety.reset(LIMITS)
-    return Pilot(
+    crew = Crew(
         explorer=explorer,
         trigger=trigger,
         planner=planner,
@@ -48,17 +51,11 @@ def make(trigger: Tbr | Ssp | Mcr, safety: NoBrake | Brake | None = None, latenc
         limits=LIMITS,
         watch=Stopwatch(),
         latency_s=latency_s,
-        settle_s=0.0,
-        restart_error_m=0.4,
-        goals_per_request=3,
-        look_around_radps=0.8,
-        turn_first_rad=0.6,
-        yaw_lookahead_s=0.8,
-        yaw_rate_radps=1.8,
+        start_m=START,
+        start_yaw_rad=0.0,
         flight_bounds_m=BOUNDS,
-        hover_m=START,
-        yaw_rad=0.0,
     )
+    return Holding(settle_s=0.0).begin(crew)
 
 
 def see(field: DistanceField, time_s: float, reference: Reference) -> Observation:
@@ -73,7 +70,7 @@ def see(field: DistanceField, time_s: float, reference: Reference) -> Observatio
     return replace(seen, state=state, reference=reference, target_m=TARGET, flight_bounds_m=BOUNDS)
 
 
-def fly(pilot: Pilot, fields: dict[float, DistanceField], until_s: float) -> np.ndarray:
+def fly(pilot: HoldingPilot, fields: dict[float, DistanceField], until_s: float) -> np.ndarray:
     """References (N, 3) every 10 ms; the map changes at the given times."""
     positions = []
     for step in range(round(until_s / 0.01)):
@@ -174,7 +171,7 @@ def test_a_moving_end_is_followed_by_a_stop() -> None:
 def test_from_standstill_it_looks_before_it_flies(yaw_rad: float) -> None:
     """It used to leave sideways into space the camera had never seen."""
     pilot = make(Ssp())
-    pilot.yaw_rad = yaw_rad
+    pilot.heading.yaw_rad = yaw_rad
     moving_m = []
     for step in range(600):
         time_s = step * 0.01

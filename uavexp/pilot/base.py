@@ -1,0 +1,71 @@
+"""Pilot role: what is flown now, and what becomes of goals, of decisions and of plans that fail.
+
+The package lies above the other roles: a pilot asks four of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from uavexp.arrays import Float
+from uavexp.explorer.base import Explorer
+from uavexp.planner.base import Planner
+from uavexp.recorder import Stopwatch
+from uavexp.safety.base import Safety
+from uavexp.trajectory import Trajectory
+from uavexp.trigger.base import TriggerPolicy
+from uavexp.types import Goal, Limits, Observation, PlanResult, Reference, Replan
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Crew:
+    """Whom a pilot asks in one trial, which they have begun, and what bounds its flight."""
+
+    explorer: Explorer
+    trigger: TriggerPolicy
+    planner: Planner
+    safety: Safety
+    limits: Limits
+    latency_s: float  # from a request to its effect
+    start_m: Float  # (3,)
+    start_yaw_rad: float
+    flight_bounds_m: Float  # (2, 3)
+    watch: Stopwatch
+
+
+class Pilot(Protocol):
+    """The rules by which a pilot flies; they stay as they are, what it begins is another object."""
+
+    def begin(self, crew: Crew) -> Piloting:
+        """Begin a trial."""
+        ...
+
+
+class Piloting(Protocol):
+    """One trial's pilot at work."""
+
+    trajectory: Trajectory | None  # being flown; None before the first plan
+    goal: Goal | None  # of that trajectory
+    best_goal: Goal | None  # the explorer's latest choice g*
+    replans: list[Replan]  # every planning request
+    dropped_triggers: int
+    first_plan: PlanResult | None  # the first that was found
+    failure: str  # reason of the last failed request, "" after a success
+
+    @property
+    def ever_planned(self) -> bool:
+        """Whether any plan was found."""
+        ...
+
+    def reference(self, time_s: float, step_s: float) -> Reference:
+        """What to follow now; asked at every step."""
+        ...
+
+    def explore(self, observation: Observation) -> None:
+        """Choose a goal anew; asked at the explorer's rate."""
+        ...
+
+    def decide(self, observation: Observation) -> float:
+        """Ask safety and trigger after an ESDF update; returns the trigger's score."""
+        ...
