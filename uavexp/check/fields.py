@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from uavexp.arrays import Bool, Float
+from uavexp.arrays import Bool, Float, UInt8
 from uavexp.field import FREE, OCCUPIED, UNKNOWN, DistanceField
 
 
@@ -70,7 +70,9 @@ def warehouse(seed: int, size_m: tuple[float, float, float] = (26.0, 16.0, 3.0))
     return grid
 
 
-def bounds(grid: Bool, voxel_m: float = 0.1, origin_m: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Float:
+def bounds(
+    grid: Bool | UInt8, voxel_m: float = 0.1, origin_m: Float | tuple[float, float, float] = (0.0, 0.0, 0.0)
+) -> Float:
     """Flight bounds (2, 3) that are the grid's own box."""
     low = np.asarray(origin_m, dtype=np.float64)
     return np.stack([low, low + np.array(grid.shape) * voxel_m])
