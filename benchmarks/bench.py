@@ -60,7 +60,7 @@ def fly(overrides: dict[str, Any]) -> dict[str, Any]:
     wall_s = time.perf_counter() - begin
     return {
         "outcome": str(log.outcome),
-        "realtime": float(log.time_s[-1]) / wall_s,
+        "realtime": float(log.steps.time_s[-1]) / wall_s,
         "laps_ms": {name: (1e3 * laps).tolist() for name, laps in log.wall_s.items()},
         "memory_mib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0,
         "scipy_edt_ms": scipy_edt_ms(parts.mapping.field.state),

@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 
 from uavexp.arrays import Float, Int32
-from uavexp.types import Difficulty, Outcome, PlanStatus, Replan, TrialLog, World
+from uavexp.log import Replan, TrialLog
+from uavexp.store.logs import flat, nested
+from uavexp.types import Difficulty, Outcome, PlanStatus, World
 
 Curve = Callable[[Float], Float]  # times (T,) -> (T, 3)
 
@@ -69,7 +71,10 @@ def make_log(
     begin_s: float = 0.0,
     **fields: Any,
 ) -> TrialLog:
-    """A flight along a curve, tracked and known exactly, 1 m from everything, unless told otherwise."""
+    """A flight along a curve, tracked and known exactly, 1 m from everything, unless told otherwise.
+
+    `fields` are named as in `log.npz`.
+    """
     rows = round(duration_s / step_s) + 1
     own_s = step_s * np.arange(rows)
     position_m, ticks = position(own_s), step_s * np.arange(0, rows, 10)
@@ -98,7 +103,12 @@ def make_log(
         "body_radius_m": 0.226,
         "mapped_m": np.zeros((0, 3), dtype=np.float32),
     }
-    return TrialLog(**(values | fields))
+    return nested(values | fields)
+
+
+def changed(log: TrialLog, **fields: Any) -> TrialLog:
+    """The log with other values of some fields, named as in `log.npz`."""
+    return nested(flat(log) | fields)
 
 
 def empty_log(**fields: Any) -> TrialLog:

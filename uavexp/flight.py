@@ -11,7 +11,8 @@ from uavexp.config.build import build
 from uavexp.config.composition import Cell, Composer
 from uavexp.config.overrides import flatten, parse_settings, render
 from uavexp.errors import ConfigError
-from uavexp.types import TrialLog, World
+from uavexp.log import TrialLog
+from uavexp.types import World
 
 if TYPE_CHECKING:
     from uavexp.trial import Progress

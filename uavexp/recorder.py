@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from scipy import ndimage
@@ -15,20 +14,29 @@ from scipy import ndimage
 from uavexp.arrays import Float
 from uavexp.bodies import distance_m
 from uavexp.field import OCCUPIED, DistanceField
+from uavexp.log import (
+    Contact,
+    FirstPlan,
+    Inspection,
+    MoverRows,
+    PlanLimits,
+    Replan,
+    Steps,
+    Ticks,
+    TrackRows,
+    TrialLog,
+)
 from uavexp.scene import Scene
 from uavexp.trigger.validity import clearance_ahead_m
 from uavexp.types import (
     Bodies,
-    Contact,
     Limits,
     Observation,
     Outcome,
     PlanResult,
     Reference,
-    Replan,
     State,
     Tracks,
-    TrialLog,
     World,
 )
 
@@ -117,7 +125,7 @@ class Recorder:
         seen_share: float,
         first_plan: PlanResult | None,
         limits: Limits,
-        mission: Mapping[str, Any],
+        inspection: Inspection,
         watch: Stopwatch,
     ) -> TrialLog:
         """Return the finished log; true clearances are measured here, all at once."""
@@ -134,54 +142,71 @@ class Recorder:
             outcome=outcome,
             reason=reason,
             step_s=step_s,
-            time_s=np.array(times),
-            position_m=np.stack(position),
-            velocity_mps=np.stack(velocity),
-            quaternion_wxyz=np.stack(quaternion),
-            estimated_position_m=np.stack(estimated),
-            reference_position_m=np.stack(reference),
-            reference_acceleration_mps2=np.stack(acceleration),
-            clearance_m=np.minimum(fixed_m, mover_m) if mover_m.size else fixed_m,
-            tick_s=np.array(tick_s),
-            esdf_clearance_m=np.array(esdf_m),
-            changed_voxels=np.array(changed, dtype=np.int64),
-            decision_score=np.array(score),
-            remaining_clearance_m=np.array(remaining_m),
+            steps=Steps(
+                time_s=np.array(times),
+                position_m=np.stack(position),
+                velocity_mps=np.stack(velocity),
+                quaternion_wxyz=np.stack(quaternion),
+                estimated_position_m=np.stack(estimated),
+                reference_position_m=np.stack(reference),
+                reference_acceleration_mps2=np.stack(acceleration),
+                clearance_m=np.minimum(fixed_m, mover_m) if mover_m.size else fixed_m,
+            ),
+            ticks=Ticks(
+                tick_s=np.array(tick_s),
+                esdf_clearance_m=np.array(esdf_m),
+                changed_voxels=np.array(changed, dtype=np.int64),
+                decision_score=np.array(score),
+                remaining_clearance_m=np.array(remaining_m),
+            ),
             replans=replans,
             dropped_triggers=dropped_triggers,
             contacts=contacts,
             goals_m=np.array(self.goals_m).reshape(-1, 3),
             seen_share=seen_share,
-            **_plan_fields(first_plan),
-            **mission,
-            max_speed_mps=limits.max_speed_mps,
-            max_acceleration_mps2=limits.max_acceleration_mps2,
-            body_radius_m=limits.body_radius_m,
             mapped_m=field.voxel_centres_m(mapped).astype(np.float32),
-            mover_shape=self.bodies[0].shape,
-            mover_half_size_m=self.bodies[0].half_size_m,
-            mover_position_m=np.stack([bodies.position_m for bodies in self.bodies]).astype(np.float32),
-            mover_clearance_m=mover_m,
-            track_count=np.array([len(tracks) for tracks in self.tracks], dtype=np.int64),
-            track_identity=np.concatenate([tracks.identity for tracks in self.tracks]),
-            track_position_m=np.concatenate([tracks.position_m for tracks in self.tracks]),
-            track_velocity_mps=np.concatenate([tracks.velocity_mps for tracks in self.tracks]),
+            movers=_mover_rows(self.bodies, mover_m),
+            tracks=_track_rows(self.tracks),
+            first_plan=_first_plan(first_plan),
+            limits=PlanLimits(
+                max_speed_mps=limits.max_speed_mps,
+                max_acceleration_mps2=limits.max_acceleration_mps2,
+                body_radius_m=limits.body_radius_m,
+            ),
+            inspection=inspection,
             wall_s={name: np.array(laps) for name, laps in watch.laps_s.items()},
         )
 
 
-def _plan_fields(plan: PlanResult | None) -> dict[str, Any]:
-    """The log's fields on the first plan; those of a flight without one keep their defaults."""
+def _mover_rows(bodies: Sequence[Bodies], clearance_m: Float) -> MoverRows:
+    return MoverRows(
+        shape=bodies[0].shape,
+        half_size_m=bodies[0].half_size_m,
+        position_m=np.stack([now.position_m for now in bodies]).astype(np.float32),
+        clearance_m=clearance_m,
+    )
+
+
+def _track_rows(tracks: Sequence[Tracks]) -> TrackRows:
+    return TrackRows(
+        count=np.array([len(now) for now in tracks], dtype=np.int64),
+        identity=np.concatenate([now.identity for now in tracks]),
+        position_m=np.concatenate([now.position_m for now in tracks]),
+        velocity_mps=np.concatenate([now.velocity_mps for now in tracks]),
+    )
+
+
+def _first_plan(plan: PlanResult | None) -> FirstPlan:
     if plan is None or plan.trajectory is None:
-        return {}
-    return {
-        "plan_path_m": plan.path_m,
-        "plan_breaks_s": plan.trajectory.breaks_s,
-        "plan_coefficients": plan.trajectory.coefficients,
-        "plan_history": plan.history,
-        "plan_tree_m": plan.tree_m.astype(np.float32),
-        "plan_collision_checks": plan.collision_checks,
-    }
+        return FirstPlan()
+    return FirstPlan(
+        path_m=plan.path_m,
+        breaks_s=plan.trajectory.breaks_s,
+        coefficients=plan.trajectory.coefficients,
+        history=plan.history,
+        tree_m=plan.tree_m.astype(np.float32),
+        collision_checks=plan.collision_checks,
+    )
 
 
 def _mover_distance_m(position_m: Sequence[Float], bodies: Sequence[Bodies]) -> Float:

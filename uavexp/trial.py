@@ -14,6 +14,7 @@ from uavexp.errors import require, require_non_negative, require_positive
 from uavexp.estimator.base import Estimator
 from uavexp.explorer.base import Explorer
 from uavexp.geometry import quaternion_from_yaw
+from uavexp.log import TrialLog
 from uavexp.mapping.base import MapBackend
 from uavexp.mission.base import Mission
 from uavexp.movers.base import Movers
@@ -25,7 +26,7 @@ from uavexp.scene import Scene
 from uavexp.seeding import Stream, generator
 from uavexp.sensor.base import Sensor
 from uavexp.trigger.base import TriggerPolicy
-from uavexp.types import MapUpdate, Observation, Outcome, Reference, State, Tracks, TrialLog, World
+from uavexp.types import MapUpdate, Observation, Outcome, Reference, State, Tracks, World
 from uavexp.vehicle.base import Vehicle
 from uavexp.vehicle.contact import ContactTracker
 from uavexp.world.base import WorldGenerator
@@ -255,7 +256,7 @@ def _log(
         contacts=contact.contacts,
         first_plan=pilot.first_plan,
         limits=parts.vehicle.limits,
-        mission=parts.mission.findings(),
+        inspection=parts.mission.findings(),
         seen_share=seen_share(world, scene, parts.mapping.field, parts.vehicle.limits)
         if exploring
         else math.nan,

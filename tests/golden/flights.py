@@ -63,7 +63,7 @@ def fly() -> dict[str, dict[str, Any]]:
         found[name] = {
             "digest": arrays_digest(log_arrays(trial.log)),
             "outcome": str(trial.log.outcome),
-            "end_s": round(float(trial.log.time_s[-1]), 6),
+            "end_s": round(float(trial.log.steps.time_s[-1]), 6),
             "plans": len(trial.log.replans),
             "path_m": round(float(trial.metrics["path_length_m"]), 6),
         }

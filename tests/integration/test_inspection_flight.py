@@ -29,17 +29,17 @@ def test_it_sees_nearly_all_that_can_be_seen_without_contact(flown: Any) -> None
 
 
 def test_cells_are_seen_while_it_flies(flown: Any) -> None:
-    seen_s = flown.log.cell_seen_s[np.isfinite(flown.log.cell_seen_s)]
+    seen_s = flown.log.inspection.cell_seen_s[np.isfinite(flown.log.inspection.cell_seen_s)]
     assert seen_s.min() == 0.0
-    assert seen_s.max() <= flown.log.time_s[-1]
+    assert seen_s.max() <= flown.log.steps.time_s[-1]
 
 
 def test_it_was_at_every_visited_viewpoint_with_its_yaw_free(flown: Any) -> None:
     log = flown.log
-    visited = np.isfinite(log.viewpoint_visited_s)
+    visited = np.isfinite(log.inspection.viewpoint_visited_s)
     assert visited.sum() >= 0.7 * len(visited)
-    row = np.round(log.viewpoint_visited_s[visited] / log.step_s).astype(int)
-    away_m = np.linalg.norm(log.position_m[row] - log.viewpoint_m[visited], axis=1)
+    row = np.round(log.inspection.viewpoint_visited_s[visited] / log.step_s).astype(int)
+    away_m = np.linalg.norm(log.steps.position_m[row] - log.inspection.viewpoint_m[visited], axis=1)
     assert away_m.max() <= 0.35 + 1e-6
 
 

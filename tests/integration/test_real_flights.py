@@ -42,5 +42,5 @@ def test_mcr_reaches_the_target_without_contact(world_id: str, pair: int) -> Non
     straight_m = np.linalg.norm(trial.world.target_m - trial.world.start_m)
     assert trial.metrics["path_length_m"] >= straight_m - 0.3 - 0.05
     inside = trial.world.flight_bounds_m + np.array([[-0.1], [0.1]])
-    assert (trial.log.position_m >= inside[0]).all()
-    assert (trial.log.position_m <= inside[1]).all()
+    assert (trial.log.steps.position_m >= inside[0]).all()
+    assert (trial.log.steps.position_m <= inside[1]).all()

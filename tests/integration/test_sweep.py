@@ -310,7 +310,7 @@ def test_a_study_reads_its_logs_and_worlds_back(undisturbed: Path) -> None:
     world = study.world(row["world_digest"])
     assert world.digest == row["world_digest"]
     log = study.log(row["trial"])
-    assert log.position_m[0] == pytest.approx(world.start_m)
+    assert log.steps.position_m[0] == pytest.approx(world.start_m)
     requests = study.replans[study.replans["trial"] == row["trial"]]
     assert list(requests["number"]) == list(range(len(log.replans)))
     assert list(requests["near_change"]) == [item.near_change for item in log.replans]

@@ -38,21 +38,26 @@ def flown() -> Any:
 def test_reaches_the_target_without_contact(flown: Any) -> None:
     assert flown.log.outcome is Outcome.REACHED
     assert flown.metrics["success"] is True
-    end_m = flown.log.position_m[-1]
+    end_m = flown.log.steps.position_m[-1]
     assert np.linalg.norm(end_m - flown.world.target_m) <= 0.3
 
 
 def test_log_rows_are_one_step_apart_and_begin_at_the_start(flown: Any) -> None:
     log = flown.log
-    np.testing.assert_allclose(np.diff(log.time_s), log.step_s)
-    np.testing.assert_array_equal(log.position_m[0], flown.world.start_m)
-    np.testing.assert_allclose(np.diff(log.tick_s), 0.1)
-    assert len(log.time_s) == len(log.position_m) == len(log.clearance_m) == len(log.reference_position_m)
+    np.testing.assert_allclose(np.diff(log.steps.time_s), log.step_s)
+    np.testing.assert_array_equal(log.steps.position_m[0], flown.world.start_m)
+    np.testing.assert_allclose(np.diff(log.ticks.tick_s), 0.1)
+    assert (
+        len(log.steps.time_s)
+        == len(log.steps.position_m)
+        == len(log.steps.clearance_m)
+        == len(log.steps.reference_position_m)
+    )
 
 
 def test_reference_is_continuous_and_keeps_the_limits(flown: Any) -> None:
     """Replans join with equal position and velocity, whatever their cause."""
-    reference_m, step_s = flown.log.reference_position_m, flown.log.step_s
+    reference_m, step_s = flown.log.steps.reference_position_m, flown.log.step_s
     velocity = np.diff(reference_m, axis=0) / step_s
     assert np.linalg.norm(velocity, axis=1).max() <= 2.5 + 1e-6
     assert np.linalg.norm(np.diff(velocity, axis=0) / step_s, axis=1).max() <= 2.5 * 1.02
@@ -60,8 +65,8 @@ def test_reference_is_continuous_and_keeps_the_limits(flown: Any) -> None:
 
 def test_clearance_is_the_true_distance(flown: Any) -> None:
     rows = slice(0, None, 97)
-    measured = Scene(flown.world).distance_m(flown.log.position_m[rows])
-    np.testing.assert_allclose(flown.log.clearance_m[rows], measured, atol=1e-5)
+    measured = Scene(flown.world).distance_m(flown.log.steps.position_m[rows])
+    np.testing.assert_allclose(flown.log.steps.clearance_m[rows], measured, atol=1e-5)
 
 
 def test_every_replan_names_its_cause_and_takes_effect_after_the_latency(flown: Any) -> None:
@@ -94,7 +99,7 @@ def test_single_shot_makes_one_plan_and_the_clock_replans_on_time() -> None:
     clock = fly(strategy="tbr", **{"trigger.interval_s": 1.0})
     ticks = [replan.time_s for replan in clock.log.replans if replan.cause == "clock"]
     np.testing.assert_allclose(ticks, np.round(ticks))
-    assert len(ticks) == int(clock.log.time_s[-1])
+    assert len(ticks) == int(clock.log.steps.time_s[-1])
 
 
 def test_literal_replans_far_more_often(flown: Any) -> None:
@@ -106,7 +111,7 @@ def test_same_seed_same_bytes_in_a_fresh_process_and_with_other_thread_settings(
     code = (
         "import uavexp, hashlib, json;"
         f"t = uavexp.fly(strategy='mcr', seed=1, **{dict(SMALL)!r});"
-        "print(json.dumps([hashlib.sha256(t.log.position_m.tobytes()).hexdigest(),"
+        "print(json.dumps([hashlib.sha256(t.log.steps.position_m.tobytes()).hexdigest(),"
         " len(t.log.replans), t.metrics['min_clearance_m']]))"
     )
     answers = set()
@@ -147,9 +152,9 @@ def test_a_body_that_flies_into_walls_touches_but_never_passes_through() -> None
     """Single shot at the target through unknown space: contacts happen, overlap does not."""
     trial = uavexp.fly(strategy="ssp", seed=0, world="rooms", stuck_s=3.0)
     scene, size = Scene(trial.world), np.array([0.32, 0.32, 0.12])
-    for row in range(0, len(trial.log.time_s), 10):
-        rotation = rotation_from_quaternion(trial.log.quaternion_wxyz[row])
-        assert not scene.touches(trial.log.position_m[row], rotation, size, -1e-3)
+    for row in range(0, len(trial.log.steps.time_s), 10):
+        rotation = rotation_from_quaternion(trial.log.steps.quaternion_wxyz[row])
+        assert not scene.touches(trial.log.steps.position_m[row], rotation, size, -1e-3)
 
 
 def test_rates_must_fit_the_step() -> None:

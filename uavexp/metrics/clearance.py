@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from uavexp.arrays import Float
-from uavexp.types import TrialLog
+from uavexp.log import TrialLog
 
 
 def smallest_m(clearance_m: Float) -> float:
@@ -19,7 +19,7 @@ def time_below_s(log: TrialLog, safety_threshold_m: float) -> float:
     The number of steps that ended below it times Δt (the start is no step). Chen et al.
     2026 draw such a threshold in figure 8 and never state it.
     """
-    return float(np.count_nonzero(log.clearance_m[1:] < safety_threshold_m)) * log.step_s
+    return float(np.count_nonzero(log.steps.clearance_m[1:] < safety_threshold_m)) * log.step_s
 
 
 def contact_time_s(log: TrialLog) -> float:
@@ -29,5 +29,5 @@ def contact_time_s(log: TrialLog) -> float:
     """
     if not log.contacts:
         return 0.0
-    last_s = float(log.time_s[-1])
+    last_s = float(log.steps.time_s[-1])
     return sum(float(np.fmin(contact.end_s, last_s)) - contact.start_s for contact in log.contacts)

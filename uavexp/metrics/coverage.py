@@ -8,27 +8,28 @@ import numpy as np
 
 from uavexp.arrays import Bool, Float
 from uavexp.geometry import polyline_length_m
-from uavexp.types import Outcome, TrialLog, World
+from uavexp.log import TrialLog
+from uavexp.types import Outcome, World
 
 
 def coverage(log: TrialLog) -> float:
     """Share of all cells to be seen that were seen; NaN without any."""
-    return _share(np.isfinite(log.cell_seen_s))
+    return _share(np.isfinite(log.inspection.cell_seen_s))
 
 
 def coverage_visible(log: TrialLog) -> float:
     """Share of those cells that can be seen from some place within reach; NaN without any."""
-    return _share(np.isfinite(log.cell_seen_s[log.cell_visible]))
+    return _share(np.isfinite(log.inspection.cell_seen_s[log.inspection.cell_visible]))
 
 
 def coverage_truth(log: TrialLog) -> float:
     """Share of the true surface's cells, blocks included, that can be seen and were; NaN without any."""
-    return _share(np.isfinite(log.true_cell_seen_s[log.true_cell_visible]))
+    return _share(np.isfinite(log.inspection.true_cell_seen_s[log.inspection.true_cell_visible]))
 
 
 def over_time(log: TrialLog, times_s: Float) -> Float:
     """Share of the visible cells seen by each time (T,) -> (T,); NaN without any."""
-    seen_s = np.sort(log.cell_seen_s[log.cell_visible])
+    seen_s = np.sort(log.inspection.cell_seen_s[log.inspection.cell_visible])
     if seen_s.size == 0:
         return np.full(times_s.shape, np.nan)
     return np.searchsorted(seen_s, times_s, side="right") / seen_s.size
@@ -36,12 +37,13 @@ def over_time(log: TrialLog, times_s: Float) -> Float:
 
 def unreachable(log: TrialLog) -> float:
     """Viewpoints that were found blocked or out of reach; NaN when time was up before all were tried."""
-    return float(np.isinf(log.viewpoint_visited_s).sum()) if log.outcome is Outcome.INSPECTED else math.nan
+    visited_s = log.inspection.viewpoint_visited_s
+    return float(np.isinf(visited_s).sum()) if log.outcome is Outcome.INSPECTED else math.nan
 
 
 def segment_switches(log: TrialLog) -> int:
     """How often two viewpoints in a row, as planned, look at different segments."""
-    return int(np.count_nonzero(np.diff(log.viewpoint_segment)))
+    return int(np.count_nonzero(np.diff(log.inspection.viewpoint_segment)))
 
 
 def tour_length_m(log: TrialLog, world: World) -> float:
@@ -49,9 +51,9 @@ def tour_length_m(log: TrialLog, world: World) -> float:
 
     A lower bound of the tour that was planned, which goes around walls.
     """
-    if log.viewpoint_m.shape[0] == 0:
+    if log.inspection.viewpoint_m.shape[0] == 0:
         return math.nan
-    return polyline_length_m(np.concatenate([world.start_m[None], log.viewpoint_m]))
+    return polyline_length_m(np.concatenate([world.start_m[None], log.inspection.viewpoint_m]))
 
 
 def scene_kind(log: TrialLog, world: World) -> str:
@@ -59,7 +61,7 @@ def scene_kind(log: TrialLog, world: World) -> str:
     if world.reference is None:
         return ""
     known, true = world.reference.triangles, world.triangles
-    people, blocks = log.mover_shape.size > 0, not np.array_equal(known, true)
+    people, blocks = log.movers.shape.size > 0, not np.array_equal(known, true)
     return {(False, False): "static", (True, False): "blocks", (False, True): "people"}.get(
         (blocks, people), "both"
     )
@@ -67,17 +69,17 @@ def scene_kind(log: TrialLog, world: World) -> str:
 
 def measures(log: TrialLog, world: World) -> dict[str, int | float | str]:
     """All of them, as columns; of a flight without cells NaN, 0 and empty."""
-    visited = int(np.isfinite(log.viewpoint_visited_s).sum())
+    visited = int(np.isfinite(log.inspection.viewpoint_visited_s).sum())
     return {
         "coverage": coverage(log),
         "coverage_visible": coverage_visible(log),
         "coverage_truth": coverage_truth(log),
-        "viewpoints": len(log.viewpoint_visited_s),
+        "viewpoints": len(log.inspection.viewpoint_visited_s),
         "visited": visited,
         "unreachable": unreachable(log),
         "segment_switches": segment_switches(log),
         "tour_length_m": tour_length_m(log, world),
-        "scene_kind": scene_kind(log, world) if log.cell_m.size else "",
+        "scene_kind": scene_kind(log, world) if log.inspection.cell_m.size else "",
     }
 
 

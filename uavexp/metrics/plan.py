@@ -11,10 +11,11 @@ import numpy as np
 
 from uavexp.arrays import Bool, Float
 from uavexp.geometry import polyline_length_m
+from uavexp.log import TrialLog
 from uavexp.metrics import voxel_path
 from uavexp.scene import Scene
 from uavexp.trajectory import Trajectory, evaluate
-from uavexp.types import TrialLog, World
+from uavexp.types import World
 
 GRID_S = 1e-3
 CHECKPOINTS = tuple(n * 10**k for k in range(5) for n in (10, 15, 20, 30, 50, 70))  # iterations
@@ -24,9 +25,10 @@ _EXCESS = 1.0 + 1e-6
 
 def planned(log: TrialLog) -> Trajectory | None:
     """The first plan's trajectory; None when there was none."""
-    if not log.plan_breaks_s.size:
+    plan = log.first_plan
+    if not plan.breaks_s.size:
         return None
-    return Trajectory(breaks_s=log.plan_breaks_s, coefficients=log.plan_coefficients, at_rest=True)
+    return Trajectory(breaks_s=plan.breaks_s, coefficients=plan.coefficients, at_rest=True)
 
 
 def measures(log: TrialLog, world: World) -> dict[str, float]:
@@ -34,14 +36,15 @@ def measures(log: TrialLog, world: World) -> dict[str, float]:
     trajectory = planned(log)
     if trajectory is None:
         return dict.fromkeys(_NAMES, float("nan"))
-    path_m = log.plan_path_m
+    path_m = log.first_plan.path_m
     count = int(np.ceil(trajectory.duration_s / GRID_S)) + 1
     times_s = np.linspace(trajectory.start_s, trajectory.end_s, count)
     position_m, velocity_mps, acceleration_mps2 = evaluate(trajectory, times_s)
     speed_mps = np.linalg.norm(velocity_mps, axis=1)
     size_mps2 = np.linalg.norm(acceleration_mps2, axis=1)
     clearance_m = Scene(world).fixed_distance_m(position_m)
-    over = (speed_mps > _EXCESS * log.max_speed_mps) | (size_mps2 > _EXCESS * log.max_acceleration_mps2)
+    fast = speed_mps > _EXCESS * log.limits.max_speed_mps
+    over = fast | (size_mps2 > _EXCESS * log.limits.max_acceleration_mps2)
     values = (
         polyline_length_m(path_m),
         polyline_length_m(position_m),
@@ -50,8 +53,8 @@ def measures(log: TrialLog, world: World) -> dict[str, float]:
         float(size_mps2.max()),
         float(stretches(over)),
         float(clearance_m.min()),
-        float(stretches(clearance_m < log.body_radius_m)),
-        float(log.plan_collision_checks),
+        float(stretches(clearance_m < log.limits.body_radius_m)),
+        float(log.first_plan.collision_checks),
         float(log.replans[0].expansions) if log.replans else float("nan"),
         float(voxel_path.height_reversals(path_m, SWING_M)),
         voxel_path.excess_climb(path_m),
@@ -84,9 +87,9 @@ def costs(log: TrialLog) -> dict[str, float]:
 
     NaN where there was no plan yet; after the search's end its last.
     """
-    if not len(log.plan_history):
+    if not len(log.first_plan.history):
         return {}
-    iteration, cost = log.plan_history.T
+    iteration, cost = log.first_plan.history.T
     return {f"plan_cost_at_{at}": _cost_at(iteration, cost, at) for at in CHECKPOINTS}
 
 

@@ -15,7 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uavexp.types import PlanStatus, Replan, TrialLog
+from uavexp.log import Replan, TrialLog
+from uavexp.types import PlanStatus
 
 # counted by name; every other cause ("retry", "brake") is "other"
 CAUSES = ("map", "goal", "clock", "distance", "collision", "covered", "expired", "arrival", "risk")
@@ -23,7 +24,7 @@ CAUSES = ("map", "goal", "clock", "distance", "collision", "covered", "expired",
 
 def executed(log: TrialLog) -> tuple[Replan, ...]:
     """Replans that took effect, in the order they did, the first plan left out."""
-    end_s = float(log.time_s[-1]) if log.time_s.size else -math.inf
+    end_s = float(log.steps.time_s[-1]) if log.steps.time_s.size else -math.inf
     flown = [replan for replan in log.replans if replan.effective_s <= end_s]
     return tuple(flown[1:])
 
@@ -90,9 +91,9 @@ def blocked_episodes(log: TrialLog) -> tuple[Blocked, ...]:
     cause was, and whether it brought a plan or, failing, stopped the vehicle. All policies
     are judged by the same map and threshold, none by its own.
     """
-    blocked = np.concatenate([[False], log.remaining_clearance_m < log.body_radius_m, [False]])
+    blocked = np.concatenate([[False], log.ticks.remaining_clearance_m < log.limits.body_radius_m, [False]])
     edges = np.flatnonzero(blocked[1:] != blocked[:-1])
-    update_s = np.append(log.tick_s, math.inf)
+    update_s = np.append(log.ticks.tick_s, math.inf)
     return tuple(
         _episode(log, float(update_s[first]), float(update_s[end]))
         for first, end in zip(edges[::2], edges[1::2], strict=True)
@@ -132,7 +133,7 @@ def blocked_delays(log: TrialLog) -> dict[str, int | float]:
         place was passed without contact, or the safety role stopped the vehicle.
         The delay leaves out unanswered episodes: read it beside their number.
     """
-    if math.isnan(log.body_radius_m):
+    if math.isnan(log.limits.body_radius_m):
         names = ("blocked_episodes", "blocked_delay_s", "blocked_unanswered", "blocked_cleared")
         return dict.fromkeys(names, math.nan)
     episodes = blocked_episodes(log)

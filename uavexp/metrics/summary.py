@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from uavexp.log import TrialLog
 from uavexp.metrics import clearance, coverage, path, plan, replanning, smoothness, tracking, tracking_movers
-from uavexp.types import Outcome, TrialLog, World
+from uavexp.types import Outcome, World
 
 Metrics = dict[str, bool | int | float | str]
 
@@ -69,8 +70,8 @@ def _clearance(log: TrialLog, safety_threshold_m: float) -> Metrics:
     return {
         "collision_count": len(log.contacts),
         "contact_time_s": clearance.contact_time_s(log),
-        "min_clearance_m": clearance.smallest_m(log.clearance_m),
-        "min_clearance_esdf_m": clearance.smallest_m(log.esdf_clearance_m),
+        "min_clearance_m": clearance.smallest_m(log.steps.clearance_m),
+        "min_clearance_esdf_m": clearance.smallest_m(log.ticks.esdf_clearance_m),
         "safety_threshold_m": safety_threshold_m,
         "time_below_safety_s": clearance.time_below_s(log, safety_threshold_m),
     }
@@ -93,8 +94,8 @@ def _replanning(log: TrialLog, useful_change_m: float) -> Metrics:
 
 
 def _tracking(log: TrialLog) -> Metrics:
-    tracking_m = tracking.distances_m(log.position_m, log.reference_position_m)
-    estimate_m = tracking.distances_m(log.position_m, log.estimated_position_m)
+    tracking_m = tracking.distances_m(log.steps.position_m, log.steps.reference_position_m)
+    estimate_m = tracking.distances_m(log.steps.position_m, log.steps.estimated_position_m)
     return {
         "tracking_error_m": tracking.rmse_m(tracking_m),
         "tracking_error_max_m": float(tracking_m.max()) if tracking_m.size else float("nan"),
@@ -103,12 +104,12 @@ def _tracking(log: TrialLog) -> Metrics:
 
 
 def _smoothness(log: TrialLog) -> Metrics:
-    acceleration_mps2 = smoothness.derivative(log.velocity_mps, log.step_s, order=1)
-    jerk_mps3 = smoothness.derivative(log.velocity_mps, log.step_s, order=2)
+    acceleration_mps2 = smoothness.derivative(log.steps.velocity_mps, log.step_s, order=1)
+    jerk_mps3 = smoothness.derivative(log.steps.velocity_mps, log.step_s, order=2)
     return {
         "acceleration_integral_m2ps3": smoothness.squared_integral(acceleration_mps2, log.step_s),
         "jerk_integral_m2ps5": smoothness.squared_integral(jerk_mps3, log.step_s),
         "reference_acceleration_integral_m2ps3": smoothness.squared_integral(
-            log.reference_acceleration_mps2, log.step_s
+            log.steps.reference_acceleration_mps2, log.step_s
         ),
     }

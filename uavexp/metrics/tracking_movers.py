@@ -15,7 +15,7 @@ import numpy as np
 
 from uavexp.arrays import Float, Int
 from uavexp.bodies import present
-from uavexp.types import Contact, TrialLog
+from uavexp.log import Contact, TrialLog
 
 HORIZONS_S = (0.3, 0.6, 0.9, 1.2)
 MEAN_HORIZONS_S = tuple(0.1 * step for step in range(1, 13))  # the mean is taken over these
@@ -37,7 +37,7 @@ class TrackQuality:
 
 def measures(log: TrialLog, near_miss_m: float) -> dict[str, bool | int | float | str]:
     """What `summary` reports of a flight with movers; nothing at all without."""
-    if not log.mover_clearance_m.size:
+    if not log.movers.clearance_m.size:
         return {}
     tracks = quality(log)
     at = zip(HORIZONS_S, tracks.prediction_error_m, strict=True)
@@ -45,7 +45,7 @@ def measures(log: TrialLog, near_miss_m: float) -> dict[str, bool | int | float 
         "mover_contacts": sum(contact.mover >= 0 for contact in log.contacts),
         "min_mover_clearance_m": _nearest_m(log),
         "near_miss_distance_m": near_miss_m,
-        "near_misses": near_misses(log.time_s, log.mover_clearance_m, log.contacts, near_miss_m),
+        "near_misses": near_misses(log.steps.time_s, log.movers.clearance_m, log.contacts, near_miss_m),
         "track_error_m": tracks.position_error_m,
         **{f"prediction_error_{horizon_s:g}s_m": error_m for horizon_s, error_m in at},
         "prediction_error_mean_m": tracks.mean_prediction_error_m,
@@ -57,7 +57,7 @@ def measures(log: TrialLog, near_miss_m: float) -> dict[str, bool | int | float 
 
 def _nearest_m(log: TrialLog) -> float:
     """Least distance to a mover; NaN when none was ever there."""
-    least_m = float(log.mover_clearance_m.min())
+    least_m = float(log.movers.clearance_m.min())
     return least_m if math.isfinite(least_m) else math.nan
 
 
@@ -119,24 +119,24 @@ def quality(log: TrialLog, *, gate_m: float = GATE_M, within_m: float = WITHIN_M
         gate_m: a track farther from a mover is not of it.
         within_m: only movers so near to the vehicle can be missed.
     """
-    ends = np.cumsum(log.track_count)
-    truth_m = log.mover_position_m.astype(np.float64)
+    ends = np.cumsum(log.tracks.count)
+    truth_m = log.movers.position_m.astype(np.float64)
     truth_m[~present(truth_m)] = np.nan  # whoever is not there cannot be predicted
     previous: dict[int, int] = {}
     apart: list[float] = []
     ahead: list[Float] = []
     near = missed = matched = switches = 0
-    for tick, (now_s, end) in enumerate(zip(log.tick_s, ends, strict=True)):
-        mine = slice(end - log.track_count[tick], end)
-        step = min(round(now_s / log.step_s), len(log.time_s) - 1)
-        movers_m = log.mover_position_m[step].astype(np.float64)
+    for tick, (now_s, end) in enumerate(zip(log.ticks.tick_s, ends, strict=True)):
+        mine = slice(end - log.tracks.count[tick], end)
+        step = min(round(now_s / log.step_s), len(log.steps.time_s) - 1)
+        movers_m = log.movers.position_m[step].astype(np.float64)
         there = present(movers_m)
-        apart_m = np.linalg.norm(movers_m[:, None] - log.track_position_m[mine][None], axis=2)
+        apart_m = np.linalg.norm(movers_m[:, None] - log.tracks.position_m[mine][None], axis=2)
         apart_m[~there] = np.inf
-        identity = log.track_identity[mine]
+        identity = log.tracks.identity[mine]
         pairs = match(apart_m, previous, identity, gate_m)
         matched += len(pairs)
-        close = there & (np.linalg.norm(movers_m - log.position_m[step], axis=1) <= within_m)
+        close = there & (np.linalg.norm(movers_m - log.steps.position_m[step], axis=1) <= within_m)
         near += int(close.sum())
         missed += sum(mover not in pairs for mover in np.flatnonzero(close))
         for mover, n in pairs.items():
@@ -145,13 +145,13 @@ def quality(log: TrialLog, *, gate_m: float = GATE_M, within_m: float = WITHIN_M
             apart.append(float(apart_m[mover, n]))
             ahead.append(
                 predicted_errors_m(
-                    now_s, log.track_position_m[mine][n], log.track_velocity_mps[mine][n], log.time_s,
+                    now_s, log.tracks.position_m[mine][n], log.tracks.velocity_mps[mine][n], log.steps.time_s,
                     truth_m[:, mover], (*HORIZONS_S, *MEAN_HORIZONS_S),
                 )
             )  # fmt: skip
     errors_m = np.array(ahead).reshape(-1, len(HORIZONS_S) + len(MEAN_HORIZONS_S))
     full_m = errors_m[np.isfinite(errors_m).all(axis=1)]
-    tracks = int(log.track_count.sum())
+    tracks = int(log.tracks.count.sum())
     return TrackQuality(
         position_error_m=_mean(np.array(apart)),
         prediction_error_m=tuple(_mean(full_m[:, h]) for h in range(len(HORIZONS_S))),

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from uavexp.arrays import Float
 from uavexp.explorer.base import Explorer
+from uavexp.log import Inspection
 from uavexp.scene import Scene
 from uavexp.types import Limits, Observation, Outcome, State, World
 
@@ -41,6 +42,6 @@ class Mission(Protocol):
         """How the flight ended, or None while it goes on; asked at every step."""
         ...
 
-    def findings(self) -> dict[str, Any]:
-        """Fields of the `TrialLog` that only this mission knows; none for most."""
+    def findings(self) -> Inspection:
+        """What only this mission knows of the flight; nothing for most."""
         ...

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from uavexp.arrays import Float
 from uavexp.errors import require_non_negative, require_positive
 from uavexp.explorer.base import Explorer
+from uavexp.log import Inspection
 from uavexp.scene import Scene
 from uavexp.types import Limits, Observation, Outcome, State, World
 
@@ -35,9 +35,9 @@ class Goto:
         """The explorer."""
         return explorer
 
-    def findings(self) -> dict[str, Any]:
+    def findings(self) -> Inspection:
         """Nothing beyond what every flight records."""
-        return {}
+        return Inspection()
 
     def reset(self, world: World, scene: Scene, limits: Limits) -> None:
         """Begin a trial in `world`."""

@@ -25,6 +25,7 @@ from uavexp.inspection.reference_surface import reference_field, surface_of_mesh
 from uavexp.inspection.view_angle import Weights
 from uavexp.inspection.viewpoints import Pattern
 from uavexp.inspection.visibility import Camera
+from uavexp.log import Inspection
 from uavexp.mission import unforeseen
 from uavexp.mission.coverage import Coverage, reachable_m, visible_anywhere
 from uavexp.mission.tour_guide import Look, TourGuide
@@ -265,21 +266,21 @@ class Inspect:
                 coverage.look(self._scene, observation.time_s, true_state.position_m, yaw_rad)
         return Outcome.INSPECTED if self._begun().finished else None
 
-    def findings(self) -> dict[str, Any]:
+    def findings(self) -> Inspection:
         """Cells and when they were seen, viewpoints and when they were visited."""
         guide, coverage, true = self._begun(), self._coverage, self._true_coverage
         order, viewpoints = guide.plan.order, guide.plan.viewpoints
-        return {
-            "cell_m": coverage.surface.point_m.astype(np.float32),
-            "cell_seen_s": coverage.seen_s,
-            "cell_visible": self._visible | np.isfinite(coverage.seen_s),
-            "true_cell_seen_s": true.seen_s,
-            "true_cell_visible": self._true_visible | np.isfinite(true.seen_s),
-            "viewpoint_m": viewpoints.position_m[order],
-            "viewpoint_yaw_rad": viewpoints.yaw_rad[order],
-            "viewpoint_segment": viewpoints.segment[order],
-            "viewpoint_visited_s": guide.visited_s[order],
-        }
+        return Inspection(
+            cell_m=coverage.surface.point_m.astype(np.float32),
+            cell_seen_s=coverage.seen_s,
+            cell_visible=self._visible | np.isfinite(coverage.seen_s),
+            true_cell_seen_s=true.seen_s,
+            true_cell_visible=self._true_visible | np.isfinite(true.seen_s),
+            viewpoint_m=viewpoints.position_m[order],
+            viewpoint_yaw_rad=viewpoints.yaw_rad[order],
+            viewpoint_segment=viewpoints.segment[order],
+            viewpoint_visited_s=guide.visited_s[order],
+        )
 
     def _plan(self, world: World) -> InspectionPlan:
         """The plan on the reference map; without one, the truth is known."""

@@ -10,12 +10,13 @@ from typing import Protocol
 
 from uavexp.arrays import Float
 from uavexp.explorer.base import Explorer
+from uavexp.log import Replan
 from uavexp.planner.base import Planner
 from uavexp.recorder import Stopwatch
 from uavexp.safety.base import Safety
 from uavexp.trajectory import Trajectory
 from uavexp.trigger.base import TriggerPolicy
-from uavexp.types import Goal, Limits, Observation, PlanResult, Reference, Replan
+from uavexp.types import Goal, Limits, Observation, PlanResult, Reference
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

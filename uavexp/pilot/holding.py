@@ -17,11 +17,12 @@ import numpy as np
 from uavexp.arrays import Float
 from uavexp.braking import braking_trajectory, with_stop
 from uavexp.errors import require, require_non_negative
+from uavexp.log import Replan
 from uavexp.pilot.base import Crew
 from uavexp.pilot.heading import Heading, bearing_rad
 from uavexp.pilot.noting import replan_of
 from uavexp.trajectory import Trajectory, derivative, evaluate, hover_before
-from uavexp.types import Decision, Goal, Observation, PlanRequest, PlanResult, PlanStatus, Reference, Replan
+from uavexp.types import Decision, Goal, Observation, PlanRequest, PlanResult, PlanStatus, Reference
 
 _GOALS_FAULT = (PlanStatus.GOAL_BLOCKED, PlanStatus.NO_PATH, PlanStatus.NOT_CLEAR)  # another may do
 _REST_MPS = 0.05  # slower is standing

@@ -7,9 +7,10 @@ import math
 import numpy as np
 
 from uavexp.arrays import Float
+from uavexp.log import Replan
 from uavexp.trajectory import Trajectory, evaluate, sample_times
 from uavexp.trigger.change import changed_near
-from uavexp.types import Decision, Goal, Observation, PlanResult, Replan
+from uavexp.types import Decision, Goal, Observation, PlanResult
 
 _NEAR_M, _CHANGED_M = 2.0, 0.15  # r_mon and delta_map of paper 1
 _SAMPLE_S = 0.1  # spacing of the samples kept of a trajectory

@@ -14,12 +14,13 @@ import numpy as np
 
 from uavexp.arrays import Float, Int
 from uavexp.bodies import present
+from uavexp.log import Replan, TrialLog
 from uavexp.metrics import path, replanning, tracking
 from uavexp.report import style
 from uavexp.report.figures import flown
 from uavexp.report.figures.looks import looks_of
 from uavexp.store.study import Study
-from uavexp.types import Replan, TrialLog, World
+from uavexp.types import World
 
 MOST_POINTS = 600  # of a path
 _ABOVE_FLIGHT_M = 0.3  # the map is cut here at first, so that one looks into the rooms
@@ -120,31 +121,31 @@ def payload(study: Study, shared: flown.SharedWorld) -> Json:
 
 
 def _flight(world: World, log: TrialLog) -> Json:
-    stride = max(1, -(-log.time_s.size // MOST_POINTS))
-    rows = np.unique(np.append(np.arange(0, log.time_s.size, stride), log.time_s.size - 1))
-    speed_mps = np.linalg.norm(log.velocity_mps[rows], axis=1)
-    error_m = tracking.distances_m(log.position_m, log.reference_position_m)[rows]
+    stride = max(1, -(-log.steps.time_s.size // MOST_POINTS))
+    rows = np.unique(np.append(np.arange(0, log.steps.time_s.size, stride), log.steps.time_s.size - 1))
+    speed_mps = np.linalg.norm(log.steps.velocity_mps[rows], axis=1)
+    error_m = tracking.distances_m(log.steps.position_m, log.steps.reference_position_m)[rows]
     hover = [
         f"{time:.1f} s<br>{speed:.2f} m/s<br>clearance {clearance:.2f} m<br>tracking error {error:.3f} m"
         for time, speed, clearance, error in zip(
-            log.time_s[rows], speed_mps, log.clearance_m[rows], error_m, strict=True
+            log.steps.time_s[rows], speed_mps, log.steps.clearance_m[rows], error_m, strict=True
         )
     ]
     return {
         "headline": _headline(log),
-        "flown": _axes(log.position_m[rows]),
+        "flown": _axes(log.steps.position_m[rows]),
         "hover": hover,
-        "reference": _axes(log.reference_position_m[rows]),
+        "reference": _axes(log.steps.reference_position_m[rows]),
         "contacts": _axes(np.array([contact.position_m for contact in log.contacts]).reshape(-1, 3)),
         "replans": [_replan(number, replan) for number, replan in enumerate(replanning.executed(log), 1)],
         "map": voxels(log.mapped_m),
-        **({"movers": _movers(log, rows[::3])} if log.mover_shape.size else {}),
+        **({"movers": _movers(log, rows[::3])} if log.movers.shape.size else {}),
     }
 
 
 def _movers(log: TrialLog, rows: Int) -> Json:
     """Paths of all movers one after the other, null where one is not there, and their last places."""
-    places_m = log.mover_position_m[rows].astype(np.float64)
+    places_m = log.movers.position_m[rows].astype(np.float64)
     there = present(places_m)
     broken_m = np.pad(
         np.where(there[..., None], places_m, np.nan), ((0, 1), (0, 0), (0, 0)), constant_values=np.nan
@@ -161,7 +162,7 @@ def _headline(log: TrialLog) -> str:
     return (
         f"{log.outcome}: {path.path_length_m(log):.1f} m in {path.completion_time_s(log):.1f} s, "
         f"{len(replanning.executed(log))} replans, {len(log.contacts)} contacts, least clearance "
-        f"{log.clearance_m.min():.2f} m"
+        f"{log.steps.clearance_m.min():.2f} m"
     )
 
 

@@ -10,9 +10,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
 
 from uavexp.arrays import Bool, Float
+from uavexp.log import TrialLog
 from uavexp.metrics import clearance, coverage, path
 from uavexp.report import movers_view, plan_view, style
-from uavexp.types import TrialLog, World
+from uavexp.types import World
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,7 +27,7 @@ _BASE = (0, 2, 6, 4)  # corners of a box's underside, in the order around it (`w
 
 def is_inspection(log: TrialLog) -> bool:
     """Whether a flight had a surface to see."""
-    return log.cell_m.size > 0
+    return log.inspection.cell_m.size > 0
 
 
 def draw(axes: Axes, world: World, log: TrialLog, view: Float) -> Normalize:
@@ -48,19 +49,18 @@ def draw(axes: Axes, world: World, log: TrialLog, view: Float) -> Normalize:
 
 def draw_coverage(axes: Axes, log: TrialLog) -> None:
     """Draw the share of the visible cells seen over time, and the visits as ticks."""
-    axes.plot(
-        log.time_s, 100.0 * coverage.over_time(log, log.time_s), color=style.GREEN, lw=1.4, label="coverage"
-    )
-    for visited_s in log.viewpoint_visited_s[np.isfinite(log.viewpoint_visited_s)]:
-        axes.axvline(visited_s, ymax=0.06, color=style.BLUE, lw=0.7)
+    time_s, visited_s = log.steps.time_s, log.inspection.viewpoint_visited_s
+    axes.plot(time_s, 100.0 * coverage.over_time(log, time_s), color=style.GREEN, lw=1.4, label="coverage")
+    for at_s in visited_s[np.isfinite(visited_s)]:
+        axes.axvline(at_s, ymax=0.06, color=style.BLUE, lw=0.7)
     axes.set(xlabel="time [s]", ylabel="visible cells seen [%]", ylim=(0.0, 103.0))
 
 
 def handles(world: World, log: TrialLog) -> list[Line2D | Patch]:
     """Legend of plan and panel, with counts."""
     counts = [int(np.count_nonzero(of_kind)) for of_kind in kinds(log)]
-    visited = int(np.isfinite(log.viewpoint_visited_s).sum())
-    missed = len(log.viewpoint_visited_s) - visited
+    visited = int(np.isfinite(log.inspection.viewpoint_visited_s).sum())
+    missed = len(log.inspection.viewpoint_visited_s) - visited
 
     def dot(colour: str, label: str) -> Line2D:
         return Line2D([], [], color=colour, marker="s", ls="", ms=4, mew=0, label=label)
@@ -85,23 +85,23 @@ def key_numbers(log: TrialLog) -> str:
     """Coverage, viewpoints and the flight, for the header."""
     visible, all_ = coverage.coverage_visible(log), coverage.coverage(log)
     share = f"{100.0 * visible:.2f} %" if math.isfinite(visible) else "–"
-    visited = int(np.isfinite(log.viewpoint_visited_s).sum())
+    visited = int(np.isfinite(log.inspection.viewpoint_visited_s).sum())
     return "    ".join(
         (
             f"seen {share} of what can be seen ({100.0 * all_:.1f} % of all)",
-            f"viewpoints {visited} of {len(log.viewpoint_visited_s)}",
+            f"viewpoints {visited} of {len(log.inspection.viewpoint_visited_s)}",
             f"path {path.path_length_m(log):.1f} m",
             f"time {path.completion_time_s(log):.1f} s",
             f"contacts {len(log.contacts)}",
-            f"least clearance {clearance.smallest_m(log.clearance_m):.2f} m",
+            f"least clearance {clearance.smallest_m(log.steps.clearance_m):.2f} m",
         )
     )
 
 
 def kinds(log: TrialLog) -> tuple[Bool, Bool, Bool]:
     """Cells (C,) seen, hidden from everywhere, and not seen although they could be."""
-    seen = np.isfinite(log.cell_seen_s)
-    return seen, ~seen & ~log.cell_visible, ~seen & log.cell_visible
+    seen = np.isfinite(log.inspection.cell_seen_s)
+    return seen, ~seen & ~log.inspection.cell_visible, ~seen & log.inspection.cell_visible
 
 
 def blocks_m(world: World) -> Float:
@@ -119,14 +119,14 @@ def _draw_cells(axes: Axes, log: TrialLog, view: Float) -> None:
     cell_pt = max(CELL_M / float(view[1, 0] - view[0, 0]) * width_pt, 1.2)
     colours = (style.GREEN, HIDDEN, style.VERMILLION)
     for order, (chosen, colour) in enumerate(zip(kinds(log), colours, strict=True)):
-        places = np.unique(np.round(log.cell_m[chosen, :2].astype(np.float64), 2), axis=0)
+        places = np.unique(np.round(log.inspection.cell_m[chosen, :2].astype(np.float64), 2), axis=0)
         size_pt = cell_pt + 0.7 * order
         axes.plot(places[:, 0], places[:, 1], "s", color=colour, ms=size_pt, mew=0, zorder=2 + 0.1 * order)
 
 
 def _draw_viewpoints(axes: Axes, log: TrialLog) -> None:
-    visited = np.isfinite(log.viewpoint_visited_s)
-    place, yaw_rad = log.viewpoint_m, log.viewpoint_yaw_rad
+    visited = np.isfinite(log.inspection.viewpoint_visited_s)
+    place, yaw_rad = log.inspection.viewpoint_m, log.inspection.viewpoint_yaw_rad
     axes.quiver(
         place[:, 0],
         place[:, 1],

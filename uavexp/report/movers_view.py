@@ -15,9 +15,10 @@ from matplotlib.patches import Circle, Patch, Rectangle
 
 from uavexp.arrays import Bool, Float
 from uavexp.bodies import distance_m, present
+from uavexp.log import Replan, TrialLog
 from uavexp.metrics.tracking_movers import GATE_M, near_miss_spans
 from uavexp.report import style
-from uavexp.types import Bodies, Replan, Shape, TrialLog
+from uavexp.types import Bodies, Shape
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,11 +38,11 @@ _HALO = (patheffects.withStroke(linewidth=2.0, foreground="white"),)
 
 def draw(axes: Axes, log: TrialLog) -> None:
     """Draw the movers' paths, fading into the past, their last outlines, and the predictions."""
-    for mover in range(log.mover_shape.size):
+    for mover in range(log.movers.shape.size):
         _draw_path(axes, log, mover)
-    if log.mover_shape.size and log.time_s.size:
+    if log.movers.shape.size and log.steps.time_s.size:
         look: dict[str, Any] = {**_AT_END, "zorder": 4.6}
-        for left in np.flatnonzero(present(log.mover_position_m[-1])):
+        for left in np.flatnonzero(present(log.movers.position_m[-1])):
             axes.add_patch(outline(log, -1, int(left), **look))
     for number, replan in enumerate(predictive(log), start=1):
         _draw_prediction(axes, log, number, replan)
@@ -51,7 +52,7 @@ def draw_near_misses(axes: Axes, log: TrialLog, near_miss_m: float) -> None:
     """Draw every near miss to scale: the limit around the vehicle, and the mover then inside it."""
     look: dict[str, Any] = {"ec": style.VERMILLION, "lw": 1.2}
     for row in near_miss_rows(log, near_miss_m):
-        place = (float(log.position_m[row, 0]), float(log.position_m[row, 1]))
+        place = (float(log.steps.position_m[row, 0]), float(log.steps.position_m[row, 1]))
         mover = nearest_mover(log, row)
         axes.add_patch(outline(log, row, mover, fc=to_rgba(style.VERMILLION, 0.3), zorder=7.2, **look))
         axes.add_patch(Circle(place, near_miss_m, fc="none", ls=(0, (2, 1)), zorder=7.3, **look))
@@ -59,15 +60,16 @@ def draw_near_misses(axes: Axes, log: TrialLog, near_miss_m: float) -> None:
 
 def draw_clearance(axes: Axes, log: TrialLog, near_miss_m: float) -> None:
     """Draw the distance to the nearest mover over time; far ones leave the panel at the top."""
-    if not np.isfinite(log.mover_clearance_m).any():
+    if not np.isfinite(log.movers.clearance_m).any():
         return
     limited = math.isfinite(near_miss_m)
-    stride = max(1, log.time_s.size // 4000)
-    distances_m = np.where(np.isfinite(log.mover_clearance_m), log.mover_clearance_m, np.nan)
+    stride = max(1, log.steps.time_s.size // 4000)
+    distances_m = np.where(np.isfinite(log.movers.clearance_m), log.movers.clearance_m, np.nan)
     nearest_m = 1.2 * float(np.nanmin(distances_m))
     wanted_m = (nearest_m if nearest_m <= HIGHEST_M else 0.0, 2.0 * near_miss_m if limited else 0.0)
     top_m = max(axes.get_ylim()[1], *wanted_m)
-    axes.plot(log.time_s[::stride], distances_m[::stride], color=style.WINE, lw=1.3, label="nearest mover")
+    time_s = log.steps.time_s[::stride]
+    axes.plot(time_s, distances_m[::stride], color=style.WINE, lw=1.3, label="nearest mover")
     if limited:
         axes.axhline(
             near_miss_m, color=style.WINE, lw=0.8, ls=(0, (1, 1.5)), label=f"near miss, {near_miss_m:g} m"
@@ -77,10 +79,10 @@ def draw_clearance(axes: Axes, log: TrialLog, near_miss_m: float) -> None:
 
 def handles(log: TrialLog, near_miss_m: float) -> list[Line2D | Patch]:
     """Legend of the movers, with counts; nothing for a flight without."""
-    count = int(present(log.mover_position_m).any(axis=0).sum()) if log.mover_shape.size else 0
+    count = int(present(log.movers.position_m).any(axis=0).sum()) if log.movers.shape.size else 0
     if not count:
         return []
-    left = int(present(log.mover_position_m[-1]).sum())
+    left = int(present(log.movers.position_m[-1]).sum())
     shown: list[Line2D | Patch] = [
         Line2D([], [], color=style.PURPLE, lw=1.6, label=f"movers, past fades ({count})"),
         Patch(label=f"movers at the end ({left})", **_AT_END),
@@ -140,42 +142,43 @@ def predicted(log: TrialLog, replan: Replan) -> tuple[Float, Float, Bool]:
     """
     positions_m, velocities_mps = tracks_at(log, replan.time_s)
     near = np.linalg.norm(positions_m - replan.position_m, axis=1) < NEAR_M
-    row = min(int(np.searchsorted(log.time_s, replan.time_s - 0.5 * log.step_s)), log.time_s.size - 1)
-    movers_m = log.mover_position_m[row].astype(np.float64)
+    time_s = log.steps.time_s
+    row = min(int(np.searchsorted(time_s, replan.time_s - 0.5 * log.step_s)), time_s.size - 1)
+    movers_m = log.movers.position_m[row].astype(np.float64)
     apart_m = np.linalg.norm(positions_m[near, None] - movers_m[None], axis=2)
     return positions_m[near], velocities_mps[near], apart_m.min(axis=1, initial=np.inf) <= GATE_M
 
 
 def tracks_at(log: TrialLog, time_s: float) -> tuple[Float, Float]:
     """Believed positions and velocities (N, 3) of the movers at the last ESDF update until a time."""
-    tick = int(np.searchsorted(log.tick_s, time_s + 0.5 * log.step_s, side="right")) - 1
-    if not 0 <= tick < log.track_count.size:
+    tick = int(np.searchsorted(log.ticks.tick_s, time_s + 0.5 * log.step_s, side="right")) - 1
+    if not 0 <= tick < log.tracks.count.size:
         return np.zeros((0, 3)), np.zeros((0, 3))
-    end = int(log.track_count[: tick + 1].sum())
-    mine = slice(end - int(log.track_count[tick]), end)
-    return log.track_position_m[mine], log.track_velocity_mps[mine]
+    end = int(log.tracks.count[: tick + 1].sum())
+    mine = slice(end - int(log.tracks.count[tick]), end)
+    return log.tracks.position_m[mine], log.tracks.velocity_mps[mine]
 
 
 def near_miss_rows(log: TrialLog, near_miss_m: float) -> tuple[int, ...]:
     """Row of the least distance in each near miss, as `metrics.tracking_movers` counts them."""
-    spans = near_miss_spans(log.time_s, log.mover_clearance_m, log.contacts, near_miss_m)
-    return tuple(int(first + np.argmin(log.mover_clearance_m[first : last + 1])) for first, last in spans)
+    spans = near_miss_spans(log.steps.time_s, log.movers.clearance_m, log.contacts, near_miss_m)
+    return tuple(int(first + np.argmin(log.movers.clearance_m[first : last + 1])) for first, last in spans)
 
 
 def nearest_mover(log: TrialLog, row: int) -> int:
     """The mover whose surface is nearest to the vehicle in a row of the log."""
     apart_m = [
-        float(distance_m(_body(log, row, mover), log.position_m[row, None])[0])
-        for mover in range(log.mover_shape.size)
+        float(distance_m(_body(log, row, mover), log.steps.position_m[row, None])[0])
+        for mover in range(log.movers.shape.size)
     ]
     return int(np.argmin(apart_m))
 
 
 def outline(log: TrialLog, row: int, mover: int, **look: Any) -> Patch:
     """A mover from above, to scale, where it is in a row of the log."""
-    x_m, y_m, _ = (float(value) for value in log.mover_position_m[row, mover])
-    half_x_m, half_y_m, _ = (float(value) for value in log.mover_half_size_m[mover])
-    if log.mover_shape[mover] == Shape.BOX:
+    x_m, y_m, _ = (float(value) for value in log.movers.position_m[row, mover])
+    half_x_m, half_y_m, _ = (float(value) for value in log.movers.half_size_m[mover])
+    if log.movers.shape[mover] == Shape.BOX:
         return Rectangle((x_m - half_x_m, y_m - half_y_m), 2.0 * half_x_m, 2.0 * half_y_m, **look)
     return Circle((x_m, y_m), half_x_m, **look)
 
@@ -183,17 +186,17 @@ def outline(log: TrialLog, row: int, mover: int, **look: Any) -> Patch:
 def _body(log: TrialLog, row: int, mover: int) -> Bodies:
     one = slice(mover, mover + 1)
     return Bodies(
-        time_s=float(log.time_s[row]),
-        shape=log.mover_shape[one],
-        half_size_m=log.mover_half_size_m[one],
-        position_m=log.mover_position_m[row, one].astype(np.float64),
+        time_s=float(log.steps.time_s[row]),
+        shape=log.movers.shape[one],
+        half_size_m=log.movers.half_size_m[one],
+        position_m=log.movers.position_m[row, one].astype(np.float64),
         velocity_mps=np.zeros((1, 3)),
     )
 
 
 def _draw_path(axes: Axes, log: TrialLog, mover: int) -> None:
-    stride = max(1, log.time_s.size // MOST_POINTS)
-    time_s, places_m = log.time_s[::stride], log.mover_position_m[::stride, mover]
+    stride = max(1, log.steps.time_s.size // MOST_POINTS)
+    time_s, places_m = log.steps.time_s[::stride], log.movers.position_m[::stride, mover]
     there = present(places_m)
     speed_mps = np.linalg.norm(np.diff(places_m, axis=0), axis=1) / np.diff(time_s)
     drawn = there[1:] & there[:-1] & (speed_mps < _FASTEST_MPS)

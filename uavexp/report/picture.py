@@ -15,9 +15,10 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from uavexp.log import TrialLog
 from uavexp.metrics import replanning
 from uavexp.report import inspection_view, movers_view, page, plan_view, style
-from uavexp.types import TrialLog, World
+from uavexp.types import World
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -83,9 +84,10 @@ def _draw_speed_bar(axes: Axes, scale: Normalize) -> None:
 
 def _draw_clearance(axes: Axes, log: TrialLog, safety_threshold_m: float, near_miss_m: float) -> None:
     """Draw true and mapped clearance over time, with the thresholds and the contacts."""
-    stride = max(1, log.time_s.size // MOST_POINTS)
-    time_s, clearance_m = log.time_s[::stride], log.clearance_m[::stride]
-    axes.plot(log.tick_s, log.esdf_clearance_m, color=style.ORANGE, lw=1.0, label="in the map (ESDF)")
+    stride = max(1, log.steps.time_s.size // MOST_POINTS)
+    time_s, clearance_m = log.steps.time_s[::stride], log.steps.clearance_m[::stride]
+    ticks = log.ticks
+    axes.plot(ticks.tick_s, ticks.esdf_clearance_m, color=style.ORANGE, lw=1.0, label="in the map (ESDF)")
     axes.plot(time_s, clearance_m, color=style.BLUE, lw=1.3, label="true")
     if math.isfinite(safety_threshold_m):
         axes.axhline(
@@ -107,9 +109,9 @@ def _draw_clearance(axes: Axes, log: TrialLog, safety_threshold_m: float, near_m
 
 def _draw_tracking(axes: Axes, log: TrialLog) -> None:
     """Draw the tracking error over time, with a tick for every replan."""
-    stride = max(1, log.time_s.size // MOST_POINTS)
-    error_m = np.linalg.norm(log.position_m - log.reference_position_m, axis=-1)
-    axes.plot(log.time_s[::stride], error_m[::stride], color=style.BLUE, lw=1.1)
+    stride = max(1, log.steps.time_s.size // MOST_POINTS)
+    error_m = np.linalg.norm(log.steps.position_m - log.steps.reference_position_m, axis=-1)
+    axes.plot(log.steps.time_s[::stride], error_m[::stride], color=style.BLUE, lw=1.1)
     size_pt = plan_view.marker_size_pt(log) - 1.5
     top: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "clip_on": False, "zorder": 5}
     for replan in replanning.failed(log):
@@ -125,9 +127,9 @@ def _draw_tracking(axes: Axes, log: TrialLog) -> None:
 def _finish_panel(axes: Axes, log: TrialLog, *, legend: bool = True) -> None:
     axes.grid(visible=True)
     axes.spines[["top", "right"]].set_visible(False)
-    end_s = float(log.time_s[-1]) if log.time_s.size else 0.0
+    end_s = float(log.steps.time_s[-1]) if log.steps.time_s.size else 0.0
     axes.set_xlim(0.0, max(end_s, 1.0))
-    if log.time_s.size < 2:
+    if log.steps.time_s.size < 2:
         axes.text(0.5, 0.5, "no flight", transform=axes.transAxes, ha="center", va="center", color="#606060")
     elif legend:
         columns = 5 if axes.get_position().width > 0.6 else 3

@@ -12,9 +12,10 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MultipleLocator
 
 from uavexp.arrays import Float
+from uavexp.log import TrialLog
 from uavexp.metrics import replanning
 from uavexp.report import movers_view, section, style
-from uavexp.types import TrialLog, World
+from uavexp.types import World
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -71,8 +72,8 @@ def visited_m(world: World, *logs: TrialLog) -> Float:
 
     An inspection has no target, and a block may stand on the way there: its flown path alone.
     """
-    flown = [log.position_m.reshape(-1, 3) for log in logs]
-    if any(log.cell_m.size for log in logs):
+    flown = [log.steps.position_m.reshape(-1, 3) for log in logs]
+    if any(log.inspection.cell_m.size for log in logs):
         return np.concatenate([world.start_m[None], *flown])
     ends = np.stack([world.start_m, world.target_m])
     return np.concatenate([ends, world.shortest_path.reshape(-1, 3), *flown])
@@ -127,10 +128,10 @@ def _draw_mapped(axes: Axes, log: TrialLog, heights_m: tuple[float, float], view
 
 def draw_path(axes: Axes, log: TrialLog) -> Normalize:
     """Draw the flown path in the colours of its speed."""
-    speed_mps = np.linalg.norm(log.velocity_mps.reshape(-1, 3), axis=1)
+    speed_mps = np.linalg.norm(log.steps.velocity_mps.reshape(-1, 3), axis=1)
     scale = Normalize(0.0, max(0.5, math.ceil(2.0 * speed_mps.max(initial=0.0)) / 2.0))
     stride = max(1, speed_mps.size // MOST_SEGMENTS)
-    points = log.position_m.reshape(-1, 3)[::stride, :2]
+    points = log.steps.position_m.reshape(-1, 3)[::stride, :2]
     if points.shape[0] > 1:
         segments = list(np.stack([points[:-1], points[1:]], axis=1))
         lines = LineCollection(
@@ -160,7 +161,7 @@ def draw_contacts(axes: Axes, log: TrialLog) -> None:
 def contact_handles(log: TrialLog) -> list[Line2D]:
     """The legend's entry for contacts with what stands, with their count; none without."""
     count = sum(contact.mover < 0 for contact in log.contacts)
-    label = f"{'wall ' if log.mover_shape.size else ''}contact ({count})"
+    label = f"{'wall ' if log.movers.shape.size else ''}contact ({count})"
     look = style.contact_marker(with_mover=False, size_pt=9.0)
     return [Line2D([], [], label=label, **look)] if count else []
 

@@ -1,4 +1,8 @@
-"""The log of a flight as `log.npz` and back, so that metrics can be recomputed without flying."""
+"""The log of a flight as `log.npz` and back, so that metrics can be recomputed without flying.
+
+The file is flat: a field of a group of the log stands under its own name, after the group's
+prefix where `PREFIX` has one; a field of an event under `replans.` or `contacts.`.
+"""
 
 from __future__ import annotations
 
@@ -9,17 +13,23 @@ import zipfile
 import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 import numpy as np
 import numpy.typing as npt
 
 from uavexp.errors import RecordError
+from uavexp.log import Contact, Replan, TrialLog
 from uavexp.store.records import write_bytes
-from uavexp.types import Contact, Outcome, PlanStatus, Replan, TrialLog
+from uavexp.types import Outcome, PlanStatus
 
 Arrays = dict[str, npt.NDArray[Any]]
 
+GROUPS: dict[str, Any] = {
+    name: kind for name, kind in get_type_hints(TrialLog).items() if dataclasses.is_dataclass(kind)
+}
+PREFIX = {"movers": "mover_", "tracks": "track_", "first_plan": "plan_"}
+EVENTS = {"replans": Replan, "contacts": Contact}
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # a zip entry must carry a time; this one never changes
 _RAGGED = ("changed_m", "trajectory_m")  # (n, 3) per replan, n differing
 
@@ -27,17 +37,33 @@ _RAGGED = ("changed_m", "trajectory_m")  # (n, 3) per replan, n differing
 def log_arrays(log: TrialLog) -> Arrays:
     """Every field of a log as arrays, clock times apart (they are no part of the record)."""
     arrays: Arrays = {}
-    for item in dataclasses.fields(TrialLog):
-        value = getattr(log, item.name)
-        if item.name == "wall_s":
-            continue
-        if item.name == "replans":
-            arrays |= _event_arrays("replans", Replan, value)
-        elif item.name == "contacts":
-            arrays |= _event_arrays("contacts", Contact, value)
+    for name, value in flat(log).items():
+        if name in EVENTS:
+            arrays |= _event_arrays(name, EVENTS[name], value)
         else:
-            arrays[item.name] = np.asarray(str(value) if isinstance(value, str) else value)
+            arrays[name] = np.asarray(str(value) if isinstance(value, str) else value)
     return arrays
+
+
+def flat(log: TrialLog) -> dict[str, Any]:
+    """The fields of a log and of its groups by their flat names, clock times apart."""
+    values = {name: getattr(log, name) for name in _names(TrialLog) if name not in (*GROUPS, "wall_s")}
+    for group, kind in GROUPS.items():
+        values |= {_flat_name(group, name): getattr(getattr(log, group), name) for name in _names(kind)}
+    return values
+
+
+def nested(values: Mapping[str, Any]) -> TrialLog:
+    """The log of such fields; what they lack (older logs have fewer) takes its default."""
+    fields = {name: values[name] for name in _names(TrialLog) if name in values}
+    for group, kind in GROUPS.items():
+        names = {name: _flat_name(group, name) for name in _names(kind)}
+        fields[group] = kind(**{name: values[key] for name, key in names.items() if key in values})
+    return TrialLog(**fields)
+
+
+def _flat_name(group: str, name: str) -> str:
+    return PREFIX.get(group, "") + name
 
 
 def arrays_digest(arrays: Mapping[str, npt.NDArray[Any]]) -> str:
@@ -97,17 +123,18 @@ def read_log(path: Path) -> TrialLog:
 
 
 def _log_of(arrays: Arrays) -> TrialLog:
-    values: dict[str, Any] = {}
-    for item in dataclasses.fields(TrialLog):
-        if item.name in arrays:
-            array = arrays[item.name]
-            values[item.name] = array.item() if array.ndim == 0 else array
-    values["outcome"] = Outcome(values["outcome"])
-    values["replans"] = tuple(
-        Replan(**{**row, "status": PlanStatus(row["status"])}) for row in _events("replans", Replan, arrays)
+    values: dict[str, Any] = {
+        name: array.item() if array.ndim == 0 else array for name, array in arrays.items() if "." not in name
+    }
+    replans = (row | {"status": PlanStatus(row["status"])} for row in _events("replans", arrays))
+    return nested(
+        values
+        | {
+            "outcome": Outcome(values["outcome"]),
+            "replans": tuple(Replan(**row) for row in replans),
+            "contacts": tuple(Contact(**row) for row in _events("contacts", arrays)),
+        }
     )
-    values["contacts"] = tuple(Contact(**row) for row in _events("contacts", Contact, arrays))
-    return TrialLog(**values)
 
 
 def _event_arrays(prefix: str, kind: type, events: Sequence[Any]) -> Arrays:
@@ -126,8 +153,8 @@ def _event_arrays(prefix: str, kind: type, events: Sequence[Any]) -> Arrays:
     return arrays
 
 
-def _events(prefix: str, kind: type, arrays: Arrays) -> list[dict[str, Any]]:
-    names = [name for name in _names(kind) if f"{prefix}.{name}" in arrays]  # older logs have fewer
+def _events(prefix: str, arrays: Arrays) -> list[dict[str, Any]]:
+    names = [name for name in _names(EVENTS[prefix]) if f"{prefix}.{name}" in arrays]  # older logs have fewer
     columns: dict[str, list[Any]] = {}
     for name in names:
         array = arrays[f"{prefix}.{name}"]

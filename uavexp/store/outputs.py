@@ -14,9 +14,10 @@ from uavexp.config.build import GROUPS, TARGET, TOP_LEVEL
 from uavexp.config.composition import Cell
 from uavexp.errors import ConfigError
 from uavexp.flight import Trial
+from uavexp.log import Replan
 from uavexp.store.logs import arrays_digest, log_arrays, pack
 from uavexp.store.records import LOG, PICTURE, RECORD, WALL, Status, canonical_json, seal
-from uavexp.types import Outcome, Replan
+from uavexp.types import Outcome
 
 _REPLAN = (
     "time_s",

@@ -22,11 +22,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from uavexp.errors import RecordError
+from uavexp.log import TrialLog
 from uavexp.store.logs import read_log
 from uavexp.store.records import LOG, WALL, canonical_json, cell_digest, read_record, trial_name
 from uavexp.store.table import FIRST_OF_REPLANS, REPLANS, TABLE, Row, replan_rows, row_of, write_table
 from uavexp.store.worlds import read_world
-from uavexp.types import TrialLog, World
+from uavexp.types import World
 
 if TYPE_CHECKING:
     import pandas as pd

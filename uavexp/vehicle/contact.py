@@ -19,7 +19,8 @@ import numpy as np
 from uavexp.arrays import Float
 from uavexp.bodies import distance_m
 from uavexp.geometry import rotation_from_quaternion
-from uavexp.types import Bodies, Contact, State
+from uavexp.log import Contact
+from uavexp.types import Bodies, State
 from uavexp.vehicle.slide import between, stopped
 
 if TYPE_CHECKING:

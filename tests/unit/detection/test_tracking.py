@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.logs import make_log
+from tests.logs import changed, make_log
 from uavexp.arrays import Float
 from uavexp.bodies import ABSENT_M
 from uavexp.check.fields import empty, field_from
 from uavexp.detection.clusters import Clusters
 from uavexp.detection.kalman import Estimate, Motion, MotionFilter, estimated
 from uavexp.detection.tracker import Tracker, TrackRule, centres_m
+from uavexp.log import Contact, TrialLog
 from uavexp.metrics.tracking_movers import match, measures, near_misses, predicted_errors_m, quality
-from uavexp.types import Contact, RayScan, Shape, TrialLog
+from uavexp.types import RayScan, Shape
 
 
 def still(times_s: Float) -> Float:
@@ -246,7 +245,7 @@ def log_with(tracks: list[tuple[int, Float, Float]], seconds: float = 4.0) -> Tr
     mover = np.stack([1.0 + time_s, 0.0 * time_s, 0.0 * time_s + 1.0], axis=1)
     tick_s = time_s[::10]
     at = mover[::10]
-    return replace(
+    return changed(
         log,
         step_s=0.01,
         time_s=time_s,
@@ -285,10 +284,10 @@ def test_a_perfect_track_has_no_error_and_a_shifted_one_its_shift() -> None:
 def test_nobody_is_predicted_to_where_he_is_not() -> None:
     """A mover that leaves and comes back: the error of a perfect track stays zero."""
     log = log_with([(3, np.zeros(3), AHEAD)])
-    away = log.mover_position_m.copy()
+    away = log.movers.position_m.copy()
     middle = len(away) // 2
     away[middle : middle + 20] = ABSENT_M
-    left = quality(replace(log, mover_position_m=away))
+    left = quality(changed(log, mover_position_m=away))
     assert max(left.prediction_error_m) < 1e-6
     assert left.mean_prediction_error_m < 1e-6
 
@@ -300,8 +299,8 @@ def test_missed_false_and_switched_tracks_are_counted() -> None:
     ghost = quality(log_with([(3, np.zeros(3), AHEAD), (4, np.array([0.0, 3.0, 0.0]), AHEAD)]))
     assert ghost.false_share == pytest.approx(0.5)
     log = log_with([(3, np.zeros(3), AHEAD)])
-    renamed = np.where(np.arange(len(log.track_identity)) < 20, 3, 9)
-    assert quality(replace(log, track_identity=renamed)).identity_switches == 1
+    renamed = np.where(np.arange(len(log.tracks.identity)) < 20, 3, 9)
+    assert quality(changed(log, track_identity=renamed)).identity_switches == 1
 
 
 def test_near_misses_are_episodes_without_a_contact() -> None:

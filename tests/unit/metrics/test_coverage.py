@@ -13,10 +13,11 @@ from tests.logs import make_log, make_world
 from uavexp.arrays import Bool, Float
 from uavexp.inspection.reference_surface import Surface, reference_field
 from uavexp.inspection.visibility import Camera
+from uavexp.log import TrialLog
 from uavexp.metrics import coverage as figures
 from uavexp.mission.coverage import Coverage, is_met, reachable_m, visible_anywhere
 from uavexp.scene import Scene
-from uavexp.types import Bodies, Outcome, Shape, TrialLog, World
+from uavexp.types import Bodies, Outcome, Shape, World
 
 WALL_X_M, EYE_M = 3.0, np.array([1.0, 0.0, 1.0])
 

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 
 import numpy as np
 import pytest
 
-from tests.logs import empty_log, make_log, make_replan, make_world, still_curve
+from tests.logs import changed, empty_log, make_log, make_replan, make_world, still_curve
+from uavexp.log import Contact, TrialLog
 from uavexp.metrics import evaluate
 from uavexp.metrics.replanning import CAUSES
 from uavexp.metrics.smoothness import derivative
-from uavexp.types import Contact, Outcome, TrialLog
+from uavexp.types import Outcome
 
 WORLD = make_world([])
 RADIUS_M, RATE_RADPS, CLIMB_MPS = 2.0, 0.8, 0.3
@@ -221,7 +221,7 @@ class TestReplans:
 def moved(log: TrialLog, rotation, shift_m) -> TrialLog:
     """The same flight in a world turned and shifted."""
     turned = {
-        name: getattr(log, name) @ rotation.T + (shift_m if "position" in name else 0.0)
+        name: getattr(log.steps, name) @ rotation.T + (shift_m if "position" in name else 0.0)
         for name in (
             "position_m",
             "velocity_mps",
@@ -230,7 +230,7 @@ def moved(log: TrialLog, rotation, shift_m) -> TrialLog:
             "reference_acceleration_mps2",
         )
     }
-    return dataclasses.replace(log, **turned)
+    return changed(log, **turned)
 
 
 def flight(**fields) -> TrialLog:

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 
 import numpy as np
 import pytest
 
-from tests.logs import make_log, make_world, still_curve
+from tests.logs import changed, make_log, make_world, still_curve
 from uavexp.metrics import evaluate
 from uavexp.metrics.plan import measures, stretches
 
 
 def planned(coefficients: list[list[list[float]]], breaks_s: list[float], **limits: float):
-    return dataclasses.replace(
+    return changed(
         make_log(still_curve(), still_curve()),
         plan_path_m=np.array([[0.0, 6.0, 1.2], [3.0, 2.0, 1.2]]),
         plan_breaks_s=np.array(breaks_s),

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
 
-from tests.logs import make_log, make_world, still_curve
+from tests.logs import changed, make_log, make_world, still_curve
 from tests.unit.metrics.test_metrics_plan import cubic
 from tests.unit.planner.find.tree.test_tree import plan
 from uavexp.report.figures.flown import SharedWorld
@@ -37,7 +35,7 @@ def test_profiles_are_the_norms_of_the_plan_below_their_limits() -> None:
 
 def test_the_tree_is_of_the_first_arm_that_has_one() -> None:
     edges = np.array([[[0.0, 6.0, 1.2], [1.0, 6.0, 1.2]]], dtype=np.float32)
-    with_tree = dataclasses.replace(cubic(), plan_tree_m=edges)
+    with_tree = changed(cubic(), plan_tree_m=edges)
     drawing = first_plans(shared(a=cubic(), b=with_tree), LOOKS)
     assert drawing is not None
     assert "tree that b ended with" in drawing.caption

@@ -13,13 +13,14 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
 from tests.inspections import building
-from tests.logs import empty_log, make_log, make_replan, make_world
+from tests.logs import changed, empty_log, make_log, make_replan, make_world
 from uavexp.bodies import ABSENT_M
+from uavexp.log import Contact, TrialLog
 from uavexp.metrics import evaluate
 from uavexp.metrics.tracking_movers import near_misses
 from uavexp.report import flight3d, movers_view, page, picture, plan_view, shown
 from uavexp.report.flight3d import _movers
-from uavexp.types import Contact, Shape, TrialLog
+from uavexp.types import Shape
 
 NEAR_M = 0.5
 SHAPES = np.array([Shape.CYLINDER, Shape.BOX, Shape.SPHERE], dtype=np.uint8)
@@ -82,10 +83,10 @@ class TestPaths:
 
     def test_no_line_joins_the_end_of_a_recording_with_its_new_begin(self):
         log = flight()
-        jumped = log.mover_position_m.copy()
+        jumped = log.movers.position_m.copy()
         jumped[500:, 0, 0] += 8.0
         axes = axes_of()
-        movers_view.draw(axes, dataclasses.replace(log, mover_position_m=jumped))
+        movers_view.draw(axes, changed(log, mover_position_m=jumped))
         segments = np.array(axes.collections[0].get_segments())
         assert len(segments) == 999
         assert np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1).max() < 0.02
@@ -182,18 +183,18 @@ class TestNearMisses:
             contacts=contacts,
         )
         rows = movers_view.near_miss_rows(log, NEAR_M)
-        assert len(rows) == near_misses(log.time_s, distances_m, contacts, NEAR_M)
+        assert len(rows) == near_misses(log.steps.time_s, distances_m, contacts, NEAR_M)
         assert all(distances_m[row] < NEAR_M for row in rows)
 
     def test_the_ring_is_to_scale_around_the_vehicle_and_the_mover_is_the_nearest(self):
         axes, log = axes_of(), flight()
         movers_view.draw_near_misses(axes, log, NEAR_M)
         mover, ring = axes.patches
-        row = int(np.argmin(log.mover_clearance_m))
-        assert log.mover_clearance_m[row] < NEAR_M
-        np.testing.assert_allclose(ring.get_center(), log.position_m[row, :2])
+        row = int(np.argmin(log.movers.clearance_m))
+        assert log.movers.clearance_m[row] < NEAR_M
+        np.testing.assert_allclose(ring.get_center(), log.steps.position_m[row, :2])
         assert ring.get_radius() == NEAR_M
-        np.testing.assert_allclose(mover.get_center(), log.mover_position_m[row, 0, :2], atol=1e-6)
+        np.testing.assert_allclose(mover.get_center(), log.movers.position_m[row, 0, :2], atol=1e-6)
 
     def test_without_a_limit_there_are_none(self):
         assert movers_view.near_miss_rows(flight(), float("nan")) == ()
@@ -252,9 +253,7 @@ class TestPicture:
     def test_is_the_same_for_the_same_flight_and_shows_the_movers(self, tmp_path, size_m):
         world, log = make_world([], size_m=(*size_m, 3.0)), flight()
         metrics = evaluate(log, world)
-        without = dataclasses.replace(
-            log, mover_position_m=np.tile(ABSENT_M, (1001, 3, 1)).astype(np.float32)
-        )
+        without = changed(log, mover_position_m=np.tile(ABSENT_M, (1001, 3, 1)).astype(np.float32))
         for name, one in (("a", log), ("b", log), ("c", without)):
             picture.draw(world, one, metrics, "command", tmp_path / f"{name}.png")
         data = [(tmp_path / f"{name}.png").read_bytes() for name in "abc"]
@@ -274,13 +273,13 @@ class TestPicture:
                 duration_s=0.0,
                 mover_shape=SHAPES,
                 mover_half_size_m=HALF_M,
-                mover_position_m=log.mover_position_m[:1],
+                mover_position_m=log.movers.position_m[:1],
                 mover_clearance_m=np.ones(1),
                 track_count=np.zeros(1, int),
             )
         else:
             cells = building().vertices_m
-            log = dataclasses.replace(
+            log = changed(
                 log, cell_m=cells, cell_seen_s=np.ones(len(cells)), cell_visible=np.ones(len(cells), bool)
             )
         picture.draw(world, log, {"near_miss_distance_m": NEAR_M}, "command", tmp_path / "a.png")

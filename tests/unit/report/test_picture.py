@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from tests.logs import empty_log, make_log, make_replan, make_world
+from uavexp.log import Contact, TrialLog
 from uavexp.metrics import evaluate
 from uavexp.report import page, plan_view, section
 from uavexp.report.picture import draw
-from uavexp.types import Contact, Outcome, TrialLog, World
+from uavexp.types import Outcome, World
 
 COMMAND = "python -m uavexp strategy=mcr world=warehouse seed=7"
 SHELVES = [([x, y, 0.0], [x + 1.0, y + 4.0, 2.0]) for x in (4.0, 8.0, 12.0, 16.0) for y in (0.5, 7.5)]
@@ -118,8 +119,8 @@ def test_draws_worlds_of_every_shape(tmp_path, size_m):
 def test_the_plan_keeps_its_proportions_and_shows_all_that_was_flown():
     world, log = synthetic()
     view = plan_view.view_m(world, log)
-    assert np.all(view[0] <= log.position_m[:, :2].min(axis=0))
-    assert np.all(view[1] >= log.position_m[:, :2].max(axis=0))
+    assert np.all(view[0] <= log.steps.position_m[:, :2].min(axis=0))
+    assert np.all(view[1] >= log.steps.position_m[:, :2].max(axis=0))
     assert np.all(view[0] >= world.bounds_m[0, :2])
     sheet = page.lay_out((20.0, 8.0))
     plan_view.draw(sheet.plan, world, log, view)

@@ -113,8 +113,8 @@ class TestPaths:
         axes = drawings["figure_3"].figure.axes[0]
         drawn = [line.get_xydata() for line in axes.lines if len(line.get_xydata()) > 100]
         for log in shared.logs.values():
-            ends = [line for line in drawn if np.allclose(line[0], log.position_m[0, :2])]
-            assert any(np.linalg.norm(line[-1] - log.position_m[-1, :2]) < 0.1 for line in ends)
+            ends = [line for line in drawn if np.allclose(line[0], log.steps.position_m[0, :2])]
+            assert any(np.linalg.norm(line[-1] - log.steps.position_m[-1, :2]) < 0.1 for line in ends)
         assert axes.get_aspect() == 1.0
 
     def test_figure_9_has_a_marker_for_every_replan_of_the_scene(self, flown, drawings):  # noqa: F811

@@ -203,7 +203,7 @@ class TestFlight:
         for flight in flights:
             log = flown.log(first.loc[flight["arm"], "trial"])
             drawn = np.array(flight["flown"]).T
-            np.testing.assert_allclose(drawn[[0, -1]], log.position_m[[0, -1]], atol=6e-4)
+            np.testing.assert_allclose(drawn[[0, -1]], log.steps.position_m[[0, -1]], atol=6e-4)
             assert len(flight["hover"]) == len(drawn) <= flight3d.MOST_POINTS + 1
             causes = [replan["cause"] for replan in flight["replans"]]
             assert causes == [replan.cause for replan in replanning.executed(log)]

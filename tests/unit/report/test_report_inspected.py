@@ -10,12 +10,12 @@ import pytest
 
 from tests.logs import make_log, make_world, still_curve
 from tests.studies import made_up
+from uavexp.log import TrialLog
 from uavexp.report.figures import drawings_of
 from uavexp.store.logs import log_arrays, write_log
 from uavexp.store.records import LOG
 from uavexp.store.study import TRIALS, WORLDS, Study
 from uavexp.store.worlds import write_world
-from uavexp.types import TrialLog
 
 ARMS = ("static", "both")
 CELLS = 40

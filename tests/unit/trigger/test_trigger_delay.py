@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from tests.logs import make_log, make_replan, make_world, still_curve
+from uavexp.log import Contact
 from uavexp.metrics import evaluate
 from uavexp.metrics.replanning import blocked_delays, request_delays
-from uavexp.types import Contact
 
 WORLD = make_world([])
 
@@ -97,7 +97,7 @@ class TestBlocked:
                 if not math.isnan(delay.delay_s):
                     assert delay.blocked_since_s + delay.delay_s == pytest.approx(replan.time_s)
                     since, until = np.round(10.0 * np.array([delay.blocked_since_s, replan.time_s]), 6)
-                    assert (remaining_m[int(since) : int(until) + 1] < log.body_radius_m).all()
+                    assert (remaining_m[int(since) : int(until) + 1] < log.limits.body_radius_m).all()
                     told += 1
             first: dict[float, float] = {}
             for delay in delays:

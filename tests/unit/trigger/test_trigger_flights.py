@@ -12,8 +12,9 @@ import uavexp
 from tests.components import build
 from uavexp.braking import with_stop
 from uavexp.check.hall import LIMITS, STRAIGHT, goal_at, observe, room
+from uavexp.log import TrialLog
 from uavexp.metrics.replanning import blocked_delays
-from uavexp.types import Outcome, PlanStatus, TrialLog
+from uavexp.types import Outcome, PlanStatus
 
 REPLANNING = ("any_of", "collision_check", "distance", "expiry", "frontier_covered", "mcr", "tbr")
 COLLISION_ONLY = (
@@ -45,8 +46,8 @@ def test_arrives(trigger: str) -> None:
     log = flown(trigger)
     assert log.outcome is Outcome.REACHED
     planned_s = min(one.effective_s for one in log.replans if one.status is PlanStatus.OK)
-    assert np.isnan(log.remaining_clearance_m[log.tick_s < planned_s - 1e-6]).all()
-    assert np.isfinite(log.remaining_clearance_m[log.tick_s >= planned_s][:5]).all()
+    assert np.isnan(log.ticks.remaining_clearance_m[log.ticks.tick_s < planned_s - 1e-6]).all()
+    assert np.isfinite(log.ticks.remaining_clearance_m[log.ticks.tick_s >= planned_s][:5]).all()
     delays = blocked_delays(log)
     if trigger in COLLISION_ONLY:
         assert delays["blocked_unanswered"] == delays["blocked_cleared"] == 0

@@ -9,13 +9,14 @@ import numpy as np
 from matplotlib.lines import Line2D
 
 from uavexp.arrays import Float
+from uavexp.log import Replan, TrialLog
 from uavexp.metrics import replanning
 from uavexp.report import plan_view, style
 from uavexp.report.figures import canvas
 from uavexp.report.figures.flown import SharedWorld
 from uavexp.report.figures.over_time import draw_replans
 from uavexp.report.parts import Drawing
-from uavexp.types import Replan, TrialLog, World
+from uavexp.types import World
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -55,7 +56,7 @@ def _draw_close_up(axes: Axes, world: World, log: TrialLog, replan: Replan, lett
     changed_m = replan.changed_m.astype(np.float64)
     plan_view.draw_truth(axes, world, plan_view.visited_m(world, log))
     axes.plot(changed_m[:, 0], changed_m[:, 1], "s", color=style.ORANGE, ms=1.6, mew=0, zorder=3)
-    flown_m = log.position_m[log.time_s <= replan.time_s]
+    flown_m = log.steps.position_m[log.steps.time_s <= replan.time_s]
     axes.plot(flown_m[:, 0], flown_m[:, 1], color=style.BLACK, lw=1.6, zorder=4)
     new_m, old_m = replan.trajectory_m, _old_plan_m(log, replan)
     axes.plot(new_m[:, 0], new_m[:, 1], color=style.BLUE, lw=2.2, zorder=4.5)
@@ -96,7 +97,7 @@ def _old_plan_m(log: TrialLog, replan: Replan) -> Float:
 
 
 def _draw_score(axes: Axes, log: TrialLog, shown: Sequence[Replan]) -> None:
-    axes.plot(log.tick_s, log.decision_score, color=style.BLACK, lw=0.9, drawstyle="steps-post")
+    axes.plot(log.ticks.tick_s, log.ticks.decision_score, color=style.BLACK, lw=0.9, drawstyle="steps-post")
     axes.axhline(1.0, color=style.BLACK, lw=0.8, ls=(0, (4, 2)))
     draw_replans(axes, log, 5.5)
     above: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "fontsize": 8}
@@ -104,7 +105,7 @@ def _draw_score(axes: Axes, log: TrialLog, shown: Sequence[Replan]) -> None:
         axes.annotate(
             _letter(number), (replan.time_s, 1.0), (0, 5), xycoords=axes.get_xaxis_transform(), **above
         )
-    axes.set(xlabel="time [s]", ylabel="event over\nthreshold", xlim=(0.0, float(log.time_s[-1])))
+    axes.set(xlabel="time [s]", ylabel="event over\nthreshold", xlim=(0.0, float(log.steps.time_s[-1])))
     axes.set_ylim(0.0, _MOST_SCORE)
     canvas.tidy(axes)
 

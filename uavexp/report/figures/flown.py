@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import pandas as pd
 
 from uavexp.errors import RecordError
+from uavexp.log import TrialLog
 from uavexp.report.comparison import SCENE, arm_names
 from uavexp.report.figures.looks import clock_arm, primary_arm
 from uavexp.report.findings import OK, arm_axes, arms_flown
 from uavexp.store.study import TRIALS, WORLDS, Study
-from uavexp.types import TrialLog, World
+from uavexp.types import World
 
 RULE = "lowest seed with a stored log of every arm shown"
 ARM = "arm of all axes"  # column of `flights_of`; an axis may be called "arm"

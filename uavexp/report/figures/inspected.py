@@ -9,13 +9,14 @@ import numpy as np
 import pandas as pd
 
 from uavexp.arrays import Float
+from uavexp.log import TrialLog
 from uavexp.metrics import coverage
 from uavexp.report import inspection_view, movers_view, plan_view
 from uavexp.report.figures import canvas, flown
 from uavexp.report.figures.looks import Look
 from uavexp.report.parts import Drawing
 from uavexp.store.study import Study
-from uavexp.types import TrialLog, World
+from uavexp.types import World
 
 KIND = "scene_kind"  # column: what the reference does not show
 _LEGEND_IN, _TITLE_IN, _AXIS_IN = 1.0, 0.4, 0.45
@@ -63,7 +64,7 @@ def over_time(study: Study, arms: tuple[str, ...], looks: Mapping[str, Look], no
     curves = {
         arm: [study.log(name) for name in flights.loc[flights[flown.ARM] == arm, "trial"]] for arm in arms
     }
-    last_s = max(log.time_s[-1] for logs in curves.values() for log in logs)
+    last_s = max(log.steps.time_s[-1] for logs in curves.values() for log in logs)
     times_s = np.linspace(0.0, last_s, _TIMES)
     figure = canvas.new_figure(canvas.PAGE_IN, 2.9)
     axes = figure.add_subplot()

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.ticker import NullLocator, StrMethodFormatter
 
+from uavexp.log import TrialLog
 from uavexp.metrics import replanning, tracking
 from uavexp.report import style
 from uavexp.report.figures import canvas
 from uavexp.report.figures.flown import RULE, SharedWorld
 from uavexp.report.figures.looks import Look
 from uavexp.report.parts import Drawing
-from uavexp.types import TrialLog
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -40,11 +40,12 @@ def path_and_tracking(name: str, shared: SharedWorld, looks: Mapping[str, Look])
 
 
 def _longest_s(shared: SharedWorld) -> float:
-    return max(1.0, *(float(log.time_s[-1]) for log in shared.logs.values()))
+    return max(1.0, *(float(log.steps.time_s[-1]) for log in shared.logs.values()))
 
 
 def _draw_position(axes: Axes, log: TrialLog, look: Look) -> None:
-    time_s, position_m, reference_m = canvas.thin(log.time_s, log.position_m, log.reference_position_m)
+    steps = log.steps
+    time_s, position_m, reference_m = canvas.thin(steps.time_s, steps.position_m, steps.reference_position_m)
     for axis, (label, width) in enumerate((("x", 1.9), ("y", 1.1))):
         axes.plot(time_s, position_m[:, axis], color=look.colour, lw=width, label=f"{label} flown")
     axes.plot(time_s, reference_m[:, 0], color=style.BLACK, lw=0.7, ls=(0, (3, 2)), label="reference")
@@ -54,8 +55,8 @@ def _draw_position(axes: Axes, log: TrialLog, look: Look) -> None:
 
 def _draw_error(axes: Axes, log: TrialLog, look: Look) -> float:
     """Draw the error with its replans; return its RMSE, m."""
-    error_m = tracking.distances_m(log.position_m, log.reference_position_m)
-    time_s, shown_m = canvas.thin(log.time_s, np.maximum(error_m, _LEAST_ERROR_M))
+    error_m = tracking.distances_m(log.steps.position_m, log.steps.reference_position_m)
+    time_s, shown_m = canvas.thin(log.steps.time_s, np.maximum(error_m, _LEAST_ERROR_M))
     axes.plot(time_s, shown_m, color=look.colour, lw=1.1)
     axes.set_yscale("log")
     axes.set_ylim(bottom=_LEAST_ERROR_M)
@@ -124,7 +125,7 @@ def clearance_over_time(
 
 
 def _draw_clearance(axes: Axes, log: TrialLog, look: Look, threshold_m: float) -> None:
-    time_s, clearance_m = canvas.thin(log.time_s, log.clearance_m)
+    time_s, clearance_m = canvas.thin(log.steps.time_s, log.steps.clearance_m)
     axes.plot(time_s, clearance_m, color=look.colour, lw=1.3)
     axes.axhline(threshold_m, color=style.BLACK, lw=0.8, ls=(0, (4, 2)))
     below = clearance_m < threshold_m
@@ -133,14 +134,14 @@ def _draw_clearance(axes: Axes, log: TrialLog, look: Look, threshold_m: float) -
         axes.plot(
             contact.start_s, 0.05, "X", color="white", mec=style.BLACK, mew=1.0, ms=6, clip_on=False, zorder=6
         )
-    axes.plot(log.time_s[-1], clearance_m[-1], ms=5.0, zorder=6, **look.point)
+    axes.plot(log.steps.time_s[-1], clearance_m[-1], ms=5.0, zorder=6, **look.point)
     canvas.tidy(axes)
 
 
 def _clearance_title(arm: str, log: TrialLog, threshold_m: float) -> str:
-    below_s = log.step_s * float(np.count_nonzero(log.clearance_m < threshold_m))
+    below_s = log.step_s * float(np.count_nonzero(log.steps.clearance_m < threshold_m))
     return (
-        f"{arm}: least {log.clearance_m.min():.2f} m, {below_s:.1f} s below {threshold_m:g} m, "
+        f"{arm}: least {log.steps.clearance_m.min():.2f} m, {below_s:.1f} s below {threshold_m:g} m, "
         f"{canvas.count(len(log.contacts), 'contact')}, {log.outcome}"
     )
 

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from uavexp.log import TrialLog
 from uavexp.metrics import path, replanning
 from uavexp.report import plan_view, style
 from uavexp.report.figures import canvas
 from uavexp.report.figures.flown import RULE, SharedWorld
 from uavexp.report.figures.looks import Look
 from uavexp.report.parts import Drawing
-from uavexp.types import TrialLog
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,7 +44,7 @@ def flight_paths(name: str, shared: SharedWorld, looks: Mapping[str, Look]) -> D
 
 def _draw_flight(axes: Axes, log: TrialLog, look: Look, order: int) -> None:
     """Draw one flight over those of lower order, so that paths that coincide all stay visible."""
-    x_m, y_m = canvas.thin(log.position_m[:, 0], log.position_m[:, 1])
+    x_m, y_m = canvas.thin(log.steps.position_m[:, 0], log.steps.position_m[:, 1])
     axes.plot(x_m, y_m, color="white", lw=4.0, zorder=3.5)
     axes.plot(x_m, y_m, lw=2.6 - 0.4 * order, zorder=4.0 + 0.1 * order, **look.line)
     for replan in replanning.executed(log):
@@ -52,7 +52,7 @@ def _draw_flight(axes: Axes, log: TrialLog, look: Look, order: int) -> None:
     for contact in log.contacts:
         cross: dict[str, Any] = {"color": "white", "mec": look.colour, "mew": 1.3, "ms": 8.0 + 2.0 * order}
         axes.plot(*contact.position_m[:2], "X", zorder=10.0 - 0.1 * order, **cross)
-    axes.plot(*log.position_m[-1, :2], ms=7.0, zorder=9, **look.point)
+    axes.plot(*log.steps.position_m[-1, :2], ms=7.0, zorder=9, **look.point)
 
 
 def _handle(arm: str, log: TrialLog, look: Look) -> Line2D:

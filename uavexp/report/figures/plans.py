@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from uavexp.arrays import Float
+from uavexp.log import TrialLog
 from uavexp.metrics import plan
 from uavexp.report import plan_view, style
 from uavexp.report.figures import canvas
@@ -18,7 +19,6 @@ from uavexp.report.figures.flown import RULE, SharedWorld
 from uavexp.report.figures.looks import Look
 from uavexp.report.parts import Drawing
 from uavexp.trajectory import Trajectory, evaluate
-from uavexp.types import TrialLog
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,7 +49,7 @@ def first_plans(shared: SharedWorld, looks: Mapping[str, Look]) -> Drawing | Non
         _draw_profile(speed, acceleration, trajectory, looks[arm])
     plan_view.draw_task(above, shared.world)
     plan_view.frame(above, view)
-    limits = next(iter(shared.logs.values()))
+    limits = next(iter(shared.logs.values())).limits
     for axes, limit, label in (
         (speed, limits.max_speed_mps, "planned speed [m/s]"),
         (acceleration, limits.max_acceleration_mps2, "planned acceleration [m/s²]"),
@@ -65,8 +65,9 @@ def first_plans(shared: SharedWorld, looks: Mapping[str, Look]) -> Drawing | Non
 def _draw_tree(axes: Axes, logs: Mapping[str, TrialLog]) -> str:
     """Draw the tree of the first arm that has one; returns that arm, or nothing."""
     for arm, log in logs.items():
-        if len(log.plan_tree_m):
-            edges = LineCollection(list(log.plan_tree_m[:, :, :2]), colors=_TREE, linewidths=0.35, zorder=2)
+        tree_m = log.first_plan.tree_m
+        if len(tree_m):
+            edges = LineCollection(list(tree_m[:, :, :2]), colors=_TREE, linewidths=0.35, zorder=2)
             axes.add_collection(edges, autolim=False)
             return arm
     return ""
@@ -76,7 +77,7 @@ def _draw_plan(axes: Axes, log: TrialLog, trajectory: Trajectory, look: Look) ->
     """Draw the trajectory, and the searched path as dots at its corners where there are few."""
     position_m = evaluate(trajectory, _times_s(trajectory))[0]
     axes.plot(position_m[:, 0], position_m[:, 1], lw=1.6, zorder=4, **look.line)
-    path_m = log.plan_path_m
+    path_m = log.first_plan.path_m
     axes.plot(path_m[:, 0], path_m[:, 1], color=look.colour, lw=0.6, ls=(0, (1, 1.5)), zorder=3.5)
 
 
