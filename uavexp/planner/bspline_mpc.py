@@ -30,13 +30,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from uavexp.errors import require, require_non_negative, require_positive
+from uavexp.planner.constraints import Constraints
 from uavexp.planner.find.grid import PathSearch
 from uavexp.planner.movers.escape import stops
 from uavexp.planner.movers.moving import MovingObstacles
 from uavexp.planner.mpc.follow import SLACK_M, Followed, Follower, least_room_m
 from uavexp.planner.mpc.guide import Guide, StaticPlanner, still_holds
 from uavexp.planner.mpc.horizon import horizon_model
-from uavexp.planner.shape.static_problem import Settings
+from uavexp.planner.shape.static_spline import StaticSpline
 from uavexp.types import Limits, PlanRequest, PlanResult, PlanStatus, Tracks
 
 
@@ -123,20 +124,24 @@ class BsplineMpc:
         del rng
         self._guide, self.slackened, self.braked = None, 0, 0
         known_only = self.unknown == "conservative"
-        settings = Settings(
+        constraints = Constraints(
+            limits=limits,
+            min_clearance_m=self.min_clearance_m,
+            safe_clearance_m=self.safe_clearance_m,
+            z_band_m=self.z_band_m,
+            known_only=known_only,
+        )
+        shaper = StaticSpline(
             order=self.order,
+            stop_at_ends=self.stop_at_ends,
             control_weight=self.control_weight,
             smooth_weight=self.smooth_weight,
             static_weight=self.static_weight,
-            min_clearance_m=self.min_clearance_m,
-            safe_clearance_m=self.safe_clearance_m,
+            end_speed_mps=self.end_speed_mps,
             duration_margin=self.duration_margin,
             control_spacing_m=self.control_spacing_m,
             first_iterations=self.first_iterations,
             final_iterations=self.final_iterations,
-            z_band_m=self.z_band_m,
-            known_only=known_only,
-            limits=limits,
         )
         search = PathSearch(
             min_clearance_m=self.min_clearance_m,
@@ -148,12 +153,7 @@ class BsplineMpc:
         )
         weights = (self.velocity_weight, self.terminal_weight, self.input_weight)
         self._follower = Follower(
-            static=StaticPlanner(
-                search=search,
-                settings=settings,
-                end_speed_mps=self.end_speed_mps,
-                stop_at_ends=self.stop_at_ends,
-            ),
+            static=StaticPlanner(search=search, shaper=shaper, constraints=constraints),
             model=horizon_model(self.horizon_steps, self.horizon_step_s, *weights),
             iterations=self.horizon_iterations,
             limits=replace(limits, max_body_rate_radps=self.turn_share * limits.max_body_rate_radps),
@@ -194,7 +194,7 @@ class BsplineMpc:
         return MovingObstacles(
             tracks=request.tracks if self.mover_horizon_s > 0.0 else Tracks.none(request.time_s),
             field=request.field,
-            body_radius_m=self._follower.static.settings.limits.body_radius_m,
+            body_radius_m=self._follower.static.constraints.limits.body_radius_m,
             margin_m=margin_m,
             horizon_s=self.mover_horizon_s,
         )
@@ -213,7 +213,7 @@ class BsplineMpc:
         room_m = least_room_m(touching, followed.trajectory, request.time_s)
         plan = replace(result, status=PlanStatus.OK, trajectory=followed.trajectory, reason=reason)
         if room_m < 0.0:
-            ways = stops(request, self._follower.static.settings.limits)
+            ways = stops(request, self._follower.static.constraints.limits)
             rooms_m = [least_room_m(touching, way, request.time_s) for way in ways]
             # braking itself unless a side step gets farther away; only what is better than to go on
             for index in sorted(range(len(ways)), key=lambda n: -min(rooms_m[n], 0.0)):

@@ -35,25 +35,23 @@ from functools import partial
 
 import numpy as np
 
-from uavexp.braking import braking_trajectory, jerk_mps3
+from uavexp.arrays import Float
+from uavexp.braking import braking_trajectory
 from uavexp.errors import require, require_non_negative, require_positive
 from uavexp.field import DistanceField
+from uavexp.planner.clearance import shortfall
+from uavexp.planner.constraints import Constraints
+from uavexp.planner.find.base import FoundPath
 from uavexp.planner.find.grid import Finder, PathSearch
 from uavexp.planner.movers.escape import safest_stop
-from uavexp.planner.shape.optimise import (
-    CONTROL_POINTS,
-    Settings,
-    fixed_shortfall,
-    moving_obstacles,
-    optimise,
-)
+from uavexp.planner.movers.moving import MovingObstacles
+from uavexp.planner.shape.scp import Scp, load
+from uavexp.planner.shape.start import REST_MPS, state_of
 from uavexp.planner.shape.stop_first import stop_first, summed
-from uavexp.planner.spline.cubic import spline_model, to_trajectory
 from uavexp.trajectory import Trajectory, evaluate, sample_times
-from uavexp.types import Limits, PlanRequest, PlanResult, PlanStatus
+from uavexp.types import Limits, PlanRequest, PlanResult, PlanStatus, Tracks
 
 _MENDED_BY_BRAKING = (PlanStatus.NOT_CLEAR, PlanStatus.LIMITS, PlanStatus.SOLVER)
-_REST_MPS = 0.05  # a slower start counts as standing
 _BRAKE_CHECK_S = 0.02
 _CLOSER = 0.4  # share of the margin that a plan among movers may fall back on
 
@@ -77,8 +75,8 @@ class MinAcc:
     max_expansions: int = 300_000
     mover_margin_m: float = 0.5
     mover_horizon_s: float = 2.0
-    _limits: Limits | None = field(default=None, init=False, repr=False)
-    _settings: Settings | None = field(default=None, init=False, repr=False)
+    _constraints: Constraints | None = field(default=None, init=False, repr=False)
+    _shaper: Scp = field(default=Scp(), init=False, repr=False)
     _search: PathSearch | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -118,27 +116,22 @@ class MinAcc:
     def reset(self, limits: Limits, rng: np.random.Generator) -> None:
         """Begin a trial of a vehicle with these limits; draws nothing."""
         del rng
-        for count in CONTROL_POINTS:
-            spline_model(count)  # cached: no request pays for it
-        self._limits = limits
-        self._settings = Settings(
-            min_clearance=self.min_clearance_m,
-            safe_clearance=self.safe_clearance_m,
+        load()
+        self._constraints = Constraints(
+            limits=limits,
+            min_clearance_m=self.min_clearance_m,
+            safe_clearance_m=self.safe_clearance_m,
+            z_band_m=self.z_band_m,
+            known_only=self.unknown == "conservative",
+        )
+        self._shaper = Scp(
             obstacle_weight=self.obstacle_weight,
-            end_speed=min(self.end_speed_mps, limits.max_speed_mps),
+            end_speed_mps=self.end_speed_mps,
             duration_margin=self.duration_margin,
-            control_spacing=self.control_spacing_m,
+            control_spacing_m=self.control_spacing_m,
             first_iterations=self.first_iterations,
             final_iterations=self.final_iterations,
             tolerance=self.tolerance,
-            z_band=self.z_band_m,
-            known_only=self.unknown == "conservative",
-            max_speed=limits.max_speed_mps,
-            max_acceleration=limits.max_acceleration_mps2,
-            max_jerk=jerk_mps3(limits),
-            body_radius=limits.body_radius_m,
-            mover_margin=self.mover_margin_m,
-            mover_horizon=self.mover_horizon_s,
         )
         self._search = PathSearch(
             min_clearance_m=self.min_clearance_m,
@@ -157,48 +150,50 @@ class MinAcc:
 
     def plan_along(self, request: PlanRequest, search: Finder) -> PlanResult:
         """`plan` with a path search of another planner in place of its own."""
-        if self._settings is None or self._limits is None:
-            raise RuntimeError("plan() needs reset() first")
-        settings, limits = self._settings, self._limits
-        result = self._attempt(request, settings, search)
-        if result.trajectory is None and len(moving_obstacles(request, settings)):
-            return self._among_movers(request, settings, search, limits, result)
+        limits = self._kept().limits
+        movers = self._movers(request, self.mover_margin_m)
+        result = self._attempt(request, movers, search)
+        if result.trajectory is None and len(movers):
+            return self._among_movers(request, movers, search, result)
         speed = float(np.linalg.norm(request.velocity_mps))
-        if result.status in _MENDED_BY_BRAKING and speed > _REST_MPS:
-            brake = braking_trajectory(
-                request.time_s, request.position_m, request.velocity_mps, request.acceleration_mps2, limits
-            )
-            return self._stop_first(request, brake, settings, search, result, "brakes first")
+        if result.status in _MENDED_BY_BRAKING and speed > REST_MPS:
+            brake = braking_trajectory(request.time_s, *state_of(request), limits)
+            return self._stop_first(request, brake, movers, search, result, "brakes first")
         return result
 
+    def _kept(self) -> Constraints:
+        if self._constraints is None:
+            raise RuntimeError("plan() needs reset() first")
+        return self._constraints
+
+    def _movers(self, request: PlanRequest, margin_m: float) -> MovingObstacles:
+        """The believed movers with what is to be kept from them; none when they do not count at all."""
+        return MovingObstacles(
+            tracks=request.tracks if self.mover_horizon_s > 0.0 else Tracks.none(request.time_s),
+            field=request.field,
+            body_radius_m=self._kept().limits.body_radius_m,
+            margin_m=margin_m,
+            horizon_s=self.mover_horizon_s,
+        )
+
     def _among_movers(
-        self,
-        request: PlanRequest,
-        settings: Settings,
-        search: Finder,
-        limits: Limits,
-        failed: PlanResult,
+        self, request: PlanRequest, movers: MovingObstacles, search: Finder, failed: PlanResult
     ) -> PlanResult:
         """Pass closer; else stop or step aside, and go on from there."""
-        closer = settings._replace(mover_margin=_CLOSER * settings.mover_margin)
+        closer = self._movers(request, _CLOSER * self.mover_margin_m)
         result = summed(failed, self._attempt(request, closer, search), "passes movers closely")
         if result.trajectory is not None:
             return result
-        stop, aside = safest_stop(
-            request,
-            moving_obstacles(request, settings),
-            partial(fixed_shortfall, request, settings),
-            limits,
-        )
+        stop, aside = safest_stop(request, movers, partial(self._shortfall, request), self._kept().limits)
         reason = "steps aside first" if aside else "brakes first"
         return self._stop_first(request, stop, closer, search, result, reason)
 
-    def _attempt(self, request: PlanRequest, settings: Settings, search: Finder) -> PlanResult:
+    def _attempt(self, request: PlanRequest, movers: MovingObstacles, search: Finder) -> PlanResult:
         """Search and optimise once."""
         began = time.perf_counter()
         goal_m = request.goal.position_m
         ends = (request.position_m, goal_m, request.flight_bounds_m)
-        found = search.find(_field_with_movers(request, settings), *ends)
+        found = search.find(self._field_with_movers(request, movers), *ends)
         if found.status is not PlanStatus.OK and len(request.tracks):
             found = search.find(request.field, *ends)  # in time there may be a way: the check decides
         searched = time.perf_counter()
@@ -209,16 +204,14 @@ class MinAcc:
                 expansions=found.expansions,
                 wall_search_s=searched - began,
             )
-        status, reason, curve, iterations = optimise(request, found.path_m, settings)
-        trajectory = None
-        if curve is not None:
-            trajectory = to_trajectory(curve.control, curve.h, request.time_s, request.goal.is_target)
+        way = FoundPath(status=found.status, path_m=found.path_m)
+        shaped = self._shaper.shape(request, way, self._kept(), movers)
         return PlanResult(
-            status=status,
-            trajectory=trajectory,
+            status=shaped.status,
+            trajectory=shaped.trajectory,
             path_m=found.path_m,
-            reason=reason or found.reason,
-            iterations=iterations,
+            reason=shaped.reason or found.reason,
+            iterations=shaped.iterations,
             expansions=found.expansions,
             wall_search_s=searched - began,
             wall_optimise_s=time.perf_counter() - searched,
@@ -228,29 +221,36 @@ class MinAcc:
         self,
         request: PlanRequest,
         stop: Trajectory,
-        settings: Settings,
+        movers: MovingObstacles,
         search: Finder,
         failed: PlanResult,
         reason: str,
     ) -> PlanResult:
         """Stop, then fly from there; the failure of the direct attempt when that fails, too."""
         way = evaluate(stop, sample_times(stop, stop.start_s, _BRAKE_CHECK_S))[0]
-        if fixed_shortfall(request, settings, way):
+        if self._shortfall(request, way):
             return failed
-        return stop_first(
-            request, stop, way[-1], lambda standing: self._attempt(standing, settings, search), failed, reason
+
+        def onward(standing: PlanRequest) -> PlanResult:
+            return self._attempt(standing, self._movers(standing, movers.margin_m), search)
+
+        return stop_first(request, stop, way[-1], onward, failed, reason)
+
+    def _shortfall(self, request: PlanRequest, points_m: Float) -> str:
+        """Say where a curve through points (P, 3) is not clear of the map (`clearance.shortfall`)."""
+        kept = self._kept()
+        strongest = kept.limits.max_acceleration_mps2
+        return shortfall(request, points_m, kept.min_clearance_m, strongest, kept.known_only)
+
+    def _field_with_movers(self, request: PlanRequest, movers: MovingObstacles) -> DistanceField:
+        """The request's map, with the movers where the vehicle would meet them if there are any."""
+        if not len(movers):
+            return request.field
+        limits = self._kept().limits
+        return movers.stamped(
+            request,
+            speed_mps=limits.max_speed_mps / self.duration_margin,
+            acceleration_mps2=limits.max_acceleration_mps2,
+            least_m=self.min_clearance_m + 0.5 * request.field.voxel_size_m,
+            safe_m=self.safe_clearance_m,
         )
-
-
-def _field_with_movers(request: PlanRequest, settings: Settings) -> DistanceField:
-    """The request's map, with the movers where the vehicle would meet them if there are any."""
-    moving = moving_obstacles(request, settings)
-    if not len(moving):
-        return request.field
-    return moving.stamped(
-        request,
-        speed_mps=settings.max_speed / settings.duration_margin,
-        acceleration_mps2=settings.max_acceleration,
-        least_m=settings.min_clearance + 0.5 * request.field.voxel_size_m,
-        safe_m=settings.safe_clearance,
-    )

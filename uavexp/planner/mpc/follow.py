@@ -13,7 +13,8 @@ from uavexp.planner.movers.moving import MovingObstacles
 from uavexp.planner.mpc.guide import Guide, StaticPlanner, phase_of
 from uavexp.planner.mpc.horizon import HorizonModel, Motion, Scene, Tracked, to_trajectory, track
 from uavexp.planner.mpc.rejoin import BLENDS_S, rejoined, state_at
-from uavexp.planner.shape.static_spline import instants, limit_excess
+from uavexp.planner.shape.excess import instants, limit_excess
+from uavexp.planner.shape.start import state_of
 from uavexp.trajectory import Trajectory, evaluate
 from uavexp.types import Limits, PlanRequest
 
@@ -48,13 +49,13 @@ class Follower:
             guide: to be followed.
             moving: the movers, with what is to be kept from them.
         """
-        start = np.stack([request.position_m, request.velocity_mps, request.acceleration_mps2])
+        start = state_of(request)
         phase_s = phase_of(guide.spline, start)[0]
         tracked = self._track(request, guide, start, phase_s, moving)
         if tracked.motion is None:
             return Followed(None, tracked.slack_m, tracked.iterations)
         touching = replace(moving, margin_m=0.0)
-        strongest = self.static.settings.limits.max_acceleration_mps2
+        strongest = self.static.constraints.limits.max_acceleration_mps2
         best, most_m = None, -np.inf
         for steps in self._lengths(guide.spline.end_s - phase_s):
             head, state, end_s, meet_s = None, start, request.time_s, phase_s
@@ -79,10 +80,10 @@ class Follower:
 
         A stop that keeps out of the regions satisfies all their half spaces, so none is given way to.
         """
-        settings, model = self.static.settings, self.model
+        kept, model = self.static.constraints, self.model
         ahead_s = model.step_s * np.arange(1.0, model.steps + 1.0)
-        wanted = Motion(*evaluate(with_stop(guide.spline, settings.limits), phase_s + ahead_s))
-        clearance_m, table = settings.min_clearance_m + _ABOVE_M, moving.table(request.time_s)
+        wanted = Motion(*evaluate(with_stop(guide.spline, kept.limits), phase_s + ahead_s))
+        clearance_m, table = kept.min_clearance_m + _ABOVE_M, moving.table(request.time_s)
         scene = Scene(request.field, clearance_m, table, request.flight_bounds_m)
         guess = _last_motion(guide, request, ahead_s) or wanted
         first = track(model, start, wanted, guess, scene, self.limits, self.iterations)
@@ -102,7 +103,7 @@ class Follower:
         """Whether a trajectory keeps the limits and the clearance."""
         if not np.isfinite(trajectory.coefficients).all():
             return False
-        if limit_excess(trajectory, self.static.settings.limits, self.model.step_s) > 1.0:
+        if limit_excess(trajectory, self.static.constraints.limits, self.model.step_s) > 1.0:
             return False
         return not self.static.shortfall(request, evaluate(trajectory, instants(trajectory))[0])
 

@@ -9,19 +9,21 @@ from typing import NamedTuple
 import numpy as np
 
 from uavexp.arrays import Float
-from uavexp.braking import braking_trajectory, stopping_distance_m
+from uavexp.braking import braking_trajectory
 from uavexp.planner.clearance import shortfall
+from uavexp.planner.constraints import Constraints
+from uavexp.planner.find.base import FoundPath
 from uavexp.planner.find.grid import PathSearch
-from uavexp.planner.shape.static_problem import Settings
-from uavexp.planner.shape.static_spline import START_EXCESS, instants, shape_spline
+from uavexp.planner.movers.moving import MovingObstacles
+from uavexp.planner.shape.excess import instants
+from uavexp.planner.shape.start import REST_MPS, refusal, state_of
+from uavexp.planner.shape.static_spline import StaticSpline
 from uavexp.planner.shape.stop_first import stop_first
 from uavexp.trajectory import Trajectory, evaluate
-from uavexp.types import Goal, PlanRequest, PlanResult, PlanStatus
+from uavexp.types import Goal, PlanRequest, PlanResult, PlanStatus, Tracks
 
+_NO_MOVERS = MovingObstacles(tracks=Tracks.none(), body_radius_m=0.0, margin_m=0.0, horizon_s=0.0)
 _MENDED_BY_BRAKING = (PlanStatus.NOT_CLEAR, PlanStatus.LIMITS, PlanStatus.SOLVER)
-_REST_MPS = 0.05  # a slower start counts as standing
-_TANGENT_M = 1.0  # length over which the path's last direction is taken
-_AHEAD_M = 0.05  # spacing at which the way beyond a moving end is checked
 _PHASE_S = 0.02  # spacing at which the nearest point of the spline is looked for
 _PHASE_WEIGHT_S2 = 0.01  # of the velocity there: it tells the two ways through a crossing apart
 
@@ -40,14 +42,13 @@ class StaticPlanner:
     """A* path, then the spline; from a moving start that defeats it, brakes first."""
 
     search: PathSearch
-    settings: Settings
-    end_speed_mps: float  # at a goal that is not the target
-    stop_at_ends: bool  # repeated control points: the spline begins and ends at rest
+    shaper: StaticSpline
+    constraints: Constraints
 
     def plan(self, request: PlanRequest) -> PlanResult:
         """Return a trajectory among static obstacles or the reason why there is none."""
-        moving = float(np.linalg.norm(request.velocity_mps)) > _REST_MPS
-        if self.stop_at_ends and (moving or np.any(request.acceleration_mps2)):
+        moving = float(np.linalg.norm(request.velocity_mps)) > REST_MPS
+        if self.shaper.stop_at_ends and (moving or np.any(request.acceleration_mps2)):
             failed = PlanResult(status=PlanStatus.NOT_CLEAR, reason="cannot stop here")
             return self.after_stop(request, self.brake(request), failed)
         result = self._attempt(request)
@@ -64,14 +65,14 @@ class StaticPlanner:
 
     def shortfall(self, request: PlanRequest, points_m: Float) -> str:
         """Say where a curve through these points (P, 3) meets a mapped obstacle; "" when it does not."""
-        settings = self.settings
-        strongest = settings.limits.max_acceleration_mps2
-        return shortfall(request, points_m, settings.min_clearance_m, strongest, settings.known_only)
+        kept = self.constraints
+        strongest = kept.limits.max_acceleration_mps2
+        return shortfall(request, points_m, kept.min_clearance_m, strongest, kept.known_only)
 
     def _attempt(self, request: PlanRequest) -> PlanResult:
         """Search and shape once."""
         began, goal_m = time.perf_counter(), request.goal.position_m
-        reason = self._refusal(request)
+        reason = refusal(state_of(request), self.constraints.limits)
         if reason:
             return PlanResult(status=PlanStatus.LIMITS, reason=reason)
         found = self.search.find(request.field, request.position_m, goal_m, request.flight_bounds_m)
@@ -83,7 +84,8 @@ class StaticPlanner:
                 expansions=found.expansions,
                 wall_search_s=searched - began,
             )
-        shaped = shape_spline(request, found.path_m, self._end_velocity(request, found.path_m), self.settings)
+        way = FoundPath(status=found.status, path_m=found.path_m)
+        shaped = self.shaper.shape(request, way, self.constraints, _NO_MOVERS)
         return PlanResult(
             status=shaped.status,
             trajectory=shaped.trajectory,
@@ -95,40 +97,10 @@ class StaticPlanner:
             wall_optimise_s=time.perf_counter() - searched,
         )
 
-    def _refusal(self, request: PlanRequest) -> str:
-        """Why no trajectory can begin like this; "" when one may."""
-        limits = self.settings.limits
-        speed = float(np.linalg.norm(request.velocity_mps))
-        strength = float(np.linalg.norm(request.acceleration_mps2))
-        fast = speed > START_EXCESS * limits.max_speed_mps
-        strong = strength > START_EXCESS * limits.max_acceleration_mps2
-        return f"the start has {speed:.2f} m/s and {strength:.2f} m/s²" if fast or strong else ""
-
     def brake(self, request: PlanRequest) -> Trajectory:
         """The way to rest in a straight line."""
         state = (request.position_m, request.velocity_mps, request.acceleration_mps2)
-        return braking_trajectory(request.time_s, *state, self.settings.limits)
-
-    def _end_velocity(self, request: PlanRequest, path_m: Float) -> Float:
-        """Velocity (3,) along the path's end that can be reached, and stopped from on clear ground."""
-        if request.goal.is_target or self.stop_at_ends or self.end_speed_mps == 0.0:
-            return np.zeros(3)
-        limits, goal_m = self.settings.limits, path_m[-1]
-        back_m = np.cumsum(np.linalg.norm(np.diff(path_m[::-1], axis=0), axis=1))
-        near = min(int(np.searchsorted(back_m, _TANGENT_M)) + 1, len(path_m) - 1)
-        along = goal_m - path_m[-1 - near]
-        length = float(np.linalg.norm(along))
-        if length < 1e-6:
-            return np.zeros(3)
-        start = float(np.linalg.norm(request.velocity_mps))
-        reachable = float(np.sqrt(start**2 + limits.max_acceleration_mps2 * back_m[-1]))
-        speed = min(self.end_speed_mps, 0.9 * limits.max_speed_mps, reachable)
-        for share in (1.0, 0.7, 0.4):
-            stop_m = stopping_distance_m(share * speed, limits) + _AHEAD_M
-            ahead = np.arange(0.0, stop_m, _AHEAD_M)[:, None] * along / length
-            if not self.shortfall(request, goal_m + ahead):
-                return np.asarray(share * speed / length * along)
-        return np.zeros(3)
+        return braking_trajectory(request.time_s, *state, self.constraints.limits)
 
 
 def phase_of(spline: Trajectory, state: Float, from_s: float = -np.inf) -> tuple[float, float]:
@@ -152,8 +124,7 @@ def still_holds(guide: Guide, request: PlanRequest, planner: StaticPlanner, with
     wanted = request.goal
     if wanted.is_target != guide.goal.is_target or np.any(wanted.position_m != guide.goal.position_m):
         return False
-    state = np.stack([request.position_m, request.velocity_mps, request.acceleration_mps2])
-    phase_s, apart_m = phase_of(guide.spline, state)
+    phase_s, apart_m = phase_of(guide.spline, state_of(request))
     if apart_m > within_m:
         return False
     times = instants(guide.spline)

@@ -22,7 +22,6 @@ from functools import cache
 from typing import NamedTuple
 
 import casadi as ca
-import daqp
 import numba as nb
 import numpy as np
 
@@ -30,7 +29,8 @@ from uavexp.arrays import Float, Int
 from uavexp.braking import jerk_mps3
 from uavexp.field import DistanceField
 from uavexp.planner.mpc.regions import mover_planes, static_planes
-from uavexp.planner.shape.static_cost import FAN, frames
+from uavexp.planner.shape.qp import solve_qp
+from uavexp.planner.shape.static_step import FAN, frames
 from uavexp.trajectory import Trajectory
 from uavexp.types import Limits
 
@@ -156,15 +156,14 @@ def track(
     motion, slack = guess, np.zeros(n)
     for done in range(rounds):
         rows, least = _rows(model, start, motion, scene, limits)
-        solution, _, flag, _ = daqp.solve(
+        solution, flag = solve_qp(
             hessian,
             gradient,
             np.concatenate([model.change, rows]),
             np.concatenate([upper, np.full(len(least), 1e30)]),
             np.concatenate([lower, least]),
-            np.zeros(7 * n + len(least), dtype=np.int32),
         )
-        if flag < 1 or not np.isfinite(solution).all():
+        if flag < 1:
             return Tracked(None, np.inf, done + 1)
         inputs, slack = solution[: 3 * n].reshape(n, 3), solution[3 * n :]
         motion = roll_out(model, start, inputs)

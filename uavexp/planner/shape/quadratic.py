@@ -16,18 +16,17 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import daqp
 import numpy as np
 
 from uavexp.arrays import Float, Int
 from uavexp.planner.shape.corridor import Corridor
+from uavexp.planner.shape.qp import INFEASIBLE, solve_qp
 from uavexp.planner.spline.clamped import Basis, end_points
 
 _CUT = 0.99  # share of the limit at which a cut is made: what is within the limit needs none
 _TOLERANCE = 1e-7  # relative, of a limit
 _NEAR_M = 0.6  # faces further from the path than this wait until they are violated
 _SLACK_M = 1e-6  # of the corridor: daqp's own tolerance
-_INFEASIBLE = (-1, -6)  # flags of daqp
 _PINNED = 3  # control points fixed at each end
 
 
@@ -92,11 +91,11 @@ def solve(problem: Problem, h: float, cuts: Cuts, rounds: int) -> Solution:
             at, along = matrices[order - 1][cuts.point[mine]], cuts.direction[mine]
             rows.append(_expand(at[:, free], along))
             sides.append(_CUT * limits[order - 1] - np.einsum("ki,ki->k", at @ guess, along))
-        step, flag = _minimise(hessian, gradient, np.concatenate(rows), np.concatenate(sides))
+        step, flag = solve_qp(hessian, gradient, np.concatenate(rows), np.concatenate(sides))
         if flag != 1:
             if len(cuts.order):  # daqp may cycle (-2) on many cuts that hardly leave room
                 return Solution(None, cuts, count, "limits")
-            return Solution(None, cuts, count, "corridor" if flag in _INFEASIBLE else "solver")
+            return Solution(None, cuts, count, "corridor" if flag in INFEASIBLE else "solver")
         control = guess.copy()
         control[free] += step.reshape(-1, 3)
         violated = ~used & (np.einsum("ri,ri->r", weight @ (control - guess), normal) > side + _SLACK_M)
@@ -127,13 +126,6 @@ def corridor_rows(basis: Basis, corridor: Corridor, guess: Float) -> tuple[Float
 def _expand(weight: Float, direction: Float) -> Float:
     """Rows (R, 3 n) over the flattened unknowns, of weights (R, n) and directions (R, 3)."""
     return (weight[:, :, None] * direction[:, None, :]).reshape(len(weight), 3 * weight.shape[1])
-
-
-def _minimise(hessian: Float, gradient: Float, rows: Float, sides: Float) -> tuple[Float, int]:
-    """Step and daqp's flag: 1 solved, -1 or -6 infeasible, others failed."""
-    sense = np.zeros(len(sides), dtype=np.int32)
-    step, _, flag, _ = daqp.solve(hessian, gradient, rows, sides, np.full(len(sides), -1e30), sense)
-    return step, int(flag) if np.isfinite(step).all() else 0
 
 
 def _beyond(control: Float, matrices: tuple[Float, Float], limits: tuple[float, float]) -> Cuts:

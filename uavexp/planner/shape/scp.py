@@ -1,317 +1,231 @@
-"""One step of the sequential convex programme of `min_acc`: local model, QP data, merit.
+"""Shaper `scp`: least acceleration among obstacles and predicted movers (METHODS.md, paper 1).
 
-Merit: ∫ ‖r''‖² + λ c(r) dt + μ Σ ‖r - p‖² over the samples that are tethered to path points p.
-The obstacle cost is c(d) = (1 - d/safe)₊² + 10 ((hard - d)/safe)₊², d the mapped distance, or what
-is left of the distance to a mover at the sample's instant (`moving`) if that is less.
-It has a kink on the medial axis of a gap, where Gauss-Newton would jump from wall to wall;
-so each sample takes slope and (non-negative) curvature of c from differences over a voxel,
-along the curve, across it, and up. The model of every step is convex.
+    min over r(t) of ∫₀ᵀ ‖r''‖² + λ c(r) dt
+    r, r', r'' at 0 as requested; r(T) = goal; ‖r'‖ <= v_max, ‖r''‖ <= a_max on [0, T]
+
+r is a uniform cubic B-spline. The energy and the sampling of the curve are written in CasADi
+(`spline`) and its matrices taken once. Each step builds the convex local model of the obstacle cost
+in numba (`scp_step`) and solves a QP with daqp; a line search on the true cost follows. Limits are
+rows of the QP, checked exactly after it. Duration, stretching and ladder: `successive`.
+
+Clearance: hard, checked every half voxel on the result. Movers are obstacles at their predicted
+places, each at its own instant (`moving`): at the samples' instants, and hard on the result.
 """
 
 from __future__ import annotations
 
-import numba as nb
+import math
+from dataclasses import dataclass
+from functools import partial
+from typing import ClassVar
+
 import numpy as np
 
-from uavexp.arrays import Float, Float32
-from uavexp.field import value_and_gradient
-from uavexp.planner.movers.moving import clearance_after
-from uavexp.planner.spline.cubic import SAMPLES
-
-HARD_WEIGHT = 10.0
-_NEAR_LIMIT = 0.6
-_NEAR_BOUND_M = 0.5
-_EXCESS_WEIGHT = 1000.0  # of relative excess over a limit in the merit: an exact penalty
-_HARD_STARTS = 4  # first accelerations, where a moving start leaves the least freedom
-# half spaces around a vector, in (along, level across, up from both): towards it and 24° from it,
-# then to the other sides as well
-_FAN = np.array(
-    [
-        [1.0, 0.0, 0.0],
-        [0.91, 0.4146083, 0.0],
-        [0.91, -0.4146083, 0.0],
-        [0.91, 0.0, 0.4146083],
-        [0.91, 0.0, -0.4146083],
-        [0.0, 1.0, 0.0],
-        [0.0, -1.0, 0.0],
-        [0.0, 0.0, 1.0],
-        [0.0, 0.0, -1.0],
-        [-1.0, 0.0, 0.0],
-    ]
+from uavexp.arrays import Float
+from uavexp.braking import jerk_mps3
+from uavexp.field import DistanceField
+from uavexp.planner.clearance import shortfall
+from uavexp.planner.constraints import Constraints
+from uavexp.planner.find.base import FoundPath
+from uavexp.planner.movers.moving import MovingObstacles
+from uavexp.planner.shape.base import ShapedPath
+from uavexp.planner.shape.excess import unavoidable
+from uavexp.planner.shape.qp import solve_qp
+from uavexp.planner.shape.scp_step import Merit, limit_rows, line_search, quadratic_model
+from uavexp.planner.shape.start import TANGENT_M
+from uavexp.planner.shape.successive import (
+    MOST_POINTS,
+    QP_SHARE,
+    Curve,
+    Effort,
+    Route,
+    Rung,
+    climb,
+    control_points,
+    hard_m,
+    route_of,
 )
+from uavexp.planner.shape.timing import STEP_M, place_by_time
+from uavexp.planner.spline.cubic import (
+    SAMPLES,
+    peak_acceleration,
+    peak_speed,
+    pin_ends,
+    sample_spline,
+    spline_model,
+    to_trajectory,
+)
+from uavexp.trajectory import Trajectory
+from uavexp.types import PlanRequest
+
+_UNKNOWN_TETHER = 400.0  # of samples within a voxel of unknown space, when that is not to be entered
+_AROUND = np.vstack([np.zeros(3), np.eye(3), -np.eye(3)])
 
 
-@nb.njit(cache=True, inline="always")
-def clearance_cost(distance_m: float, safe_m: float, hard_m: float) -> float:
-    """c(d) = (1 - d/safe)₊² + 10 ((hard - d)/safe)₊² of a clearance d, m."""
-    soft = max(1.0 - distance_m / safe_m, 0.0)
-    hard = max((hard_m - distance_m) / safe_m, 0.0)
-    return soft * soft + HARD_WEIGHT * hard * hard
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scp:
+    """Least acceleration by sequential convex programming; see the module."""
+
+    sees_movers: ClassVar[bool] = True
+
+    obstacle_weight: float = 60.0
+    end_speed_mps: float = 1.5
+    duration_margin: float = 1.1
+    control_spacing_m: float = 0.6
+    first_iterations: int = 3
+    final_iterations: int = 4
+    tolerance: float = 0.01
+
+    def shape(
+        self, request: PlanRequest, found: FoundPath, constraints: Constraints, movers: MovingObstacles
+    ) -> ShapedPath:
+        """Return a trajectory or the reason why there is none (`Shaper.shape`)."""
+        route = route_of(request, found.path_m, constraints.z_band_m)
+        if not request.goal.is_target:
+            end_speed = min(self.end_speed_mps, constraints.limits.max_speed_mps)
+            route.end[1] = _end_velocity(route, request.field, constraints, end_speed)
+        effort = Effort(self.duration_margin, self.first_iterations, self.final_iterations)
+        make = partial(_Cubic, self, request, route, constraints, movers)
+        return climb(route, constraints.limits, effort, make)
 
 
-@nb.njit(cache=True)
-def merit(
-    control: Float,
-    h: float,
-    energy: Float,
-    position: Float,
-    distance: Float32,
-    origin_m: Float,
-    voxel_m: float,
-    weights: Float,
-    tether_m: Float,
-    tether_weight: Float,
-    limits: Float,
-    movers: Float,
-) -> float:
-    """Value of the merit at control points (N, 3).
-
-    `weights` are λ, safe, hard and least distance; `limits` are those of speed and acceleration;
-    `movers` is the table of `moving`, its times counted from the start of the curve.
-    """
-    bent = energy @ control
-    total = (control * bent).sum() / h**3
-    for i in range(2, control.shape[0] - 3):
-        fast, strong = 0.0, 0.0
-        for axis in range(3):
-            fast += (control[i + 1, axis] - control[i, axis]) ** 2
-            strong += (control[i - 1, axis] - 2.0 * control[i, axis] + control[i + 1, axis]) ** 2
-        total += _EXCESS_WEIGHT * max(np.sqrt(fast) / (h * limits[0]) - 1.0, 0.0)
-        total += _EXCESS_WEIGHT * max(np.sqrt(strong) / (h * h * limits[1]) - 1.0, 0.0)
-    points = _samples(control, position)
-    d, _ = value_and_gradient(distance, origin_m, voxel_m, points)
-    _heed(movers, points, 1, h, weights[3], d)
-    share = h / SAMPLES
-    for k in range(points.shape[0]):
-        total += weights[0] * share * clearance_cost(d[k], weights[1], weights[2])
-        if tether_weight[k] > 0.0:
-            total += tether_weight[k] * share * ((points[k] - tether_m[k]) ** 2).sum()
-    return float(total)
+def _end_velocity(route: Route, field: DistanceField, constraints: Constraints, end_speed: float) -> Float:
+    """Velocity (3,) along the path's end, no more than can be reached, and stopped from beyond it."""
+    path, goal, limits = route.path, route.end[0], constraints.limits
+    along = goal - path[max(len(path) - 1 - round(TANGENT_M / STEP_M), 0)]
+    length = float(np.linalg.norm(along))
+    if length < 1e-6 or end_speed == 0.0:
+        return np.zeros(3)
+    along /= length
+    travel = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+    reachable = float(route.start[1] @ route.start[1]) + limits.max_acceleration_mps2 * travel
+    # Stop as flown: jerk-limited, v²/(2a) + v a/(2j) (`brake`)
+    ramp = limits.max_acceleration_mps2 / (2.0 * jerk_mps3(limits))
+    stop_m = end_speed**2 / (2.0 * limits.max_acceleration_mps2) + end_speed * ramp
+    ahead = np.arange(1, math.ceil(stop_m / STEP_M) + 1) * STEP_M
+    beyond = goal + ahead[:, None] * along
+    free = field.distance_m(beyond) >= constraints.min_clearance_m
+    free &= ((beyond >= route.bounds[0]) & (beyond <= route.bounds[1])).all(axis=1)
+    if constraints.known_only:
+        free &= field.observed(beyond)
+    room = ahead[-1] if free.all() else ahead[np.argmin(free)] - STEP_M
+    stoppable = limits.max_acceleration_mps2 * (
+        math.sqrt(ramp**2 + 2.0 * room / limits.max_acceleration_mps2) - ramp
+    )
+    velocity: Float = min(end_speed, math.sqrt(reachable), stoppable) * along
+    return velocity
 
 
-@nb.njit(cache=True)
-def _heed(movers: Float, points: Float, each: int, h: float, least_m: float, distance_m: Float) -> None:
-    """Lower the distances of points, `each` of a sample, that are near a mover at the sample's instant.
-
-    To be just clear of a mover is worth as much as to have the least distance from what is fixed.
-    """
-    if movers.shape[0] == 0:
-        return
-    for n in range(points.shape[0]):
-        ahead_s = (n // each + 0.5) * h / SAMPLES
-        clearance = clearance_after(movers, points[n, 0], points[n, 1], points[n, 2], ahead_s)
-        distance_m[n] = min(distance_m[n], clearance + least_m)
+def load() -> None:
+    """Take the matrices of every size that is used: no request pays for it."""
+    for count in range(10, MOST_POINTS + 1, 2):
+        spline_model(count)
 
 
-@nb.njit(cache=True)
-def _samples(control: Float, position: Float) -> Float:
-    """Sample points (SAMPLES * M, 3); row k of `position` has its four entries from k // SAMPLES on."""
-    count = position.shape[0]
-    points = np.zeros((count, 3))
-    for k in range(count):
-        m = k // SAMPLES
-        for j in range(m, m + 4):
-            for axis in range(3):
-                points[k, axis] += position[k, j] * control[j, axis]
-    return points
+class _Cubic:
+    """`Model` of one rung: a cubic spline, its merit and limits."""
 
+    retimed_from = 0.03
 
-@nb.njit(cache=True)
-def _frame(vector: Float) -> Float:
-    """Unit vectors (3, 3) along a vector, level across it, and up from both.
+    def __init__(
+        self,
+        shaper: Scp,
+        request: PlanRequest,
+        route: Route,
+        constraints: Constraints,
+        movers: MovingObstacles,
+        rung: Rung,
+    ) -> None:
+        self.shaper, self.request, self.route, self.rung = shaper, request, route, rung
+        self.constraints, self.movers = constraints, movers
+        length = STEP_M * (len(route.raw) - 1)
+        matrices = spline_model(control_points(rung.finer * length / shaper.control_spacing_m, 3))
+        self.spans = matrices.control_points - 3
+        limits, field = constraints.limits, request.field
+        samples = len(matrices.position)
+        self.merit = Merit(
+            h=0.0,
+            energy=matrices.energy,
+            position=matrices.position,
+            distance=field.distance,
+            origin_m=field.origin_m,
+            voxel_m=field.voxel_size_m,
+            obstacle_weight=shaper.obstacle_weight * rung.weight,
+            safe_m=constraints.safe_clearance_m,
+            hard_m=hard_m(constraints, field.voxel_size_m),
+            least_m=constraints.min_clearance_m,
+            tether_m=np.zeros((samples, 3)),
+            tether_weight=np.zeros(samples),
+            limits=QP_SHARE * np.array([limits.max_speed_mps, limits.max_acceleration_mps2]),
+            movers=movers.table(request.time_s),
+        )
 
-    The world's own axes when it is zero or within 6° of the vertical.
-    """
-    frame = np.zeros((3, 3))
-    norm = np.sqrt((vector * vector).sum())
-    flat = np.sqrt(vector[0] * vector[0] + vector[1] * vector[1])
-    if flat < 1e-6 or flat < 0.1 * norm:
-        for axis in range(3):
-            frame[axis, axis] = 1.0
-        return frame
-    for axis in range(3):
-        frame[0, axis] = vector[axis] / norm
-    frame[1, 0], frame[1, 1] = -vector[1] / flat, vector[0] / flat
-    frame[2, 0] = -frame[0, 2] * frame[1, 1]
-    frame[2, 1] = frame[0, 2] * frame[1, 0]
-    frame[2, 2] = flat / norm
-    return frame
+    def guess(self, points_m: Float, times_s: Float, duration_s: float) -> Float:
+        """`Model.guess`."""
+        h, stretch = duration_s / self.spans, duration_s / float(times_s[-1])
+        control: Float = place_by_time(points_m, times_s, self.spans + 3, h, stretch)
+        return control
 
+    def pin(self, curve: Curve) -> Curve:
+        """`Model.pin`."""
+        pin_ends(curve.control, curve.h, self.route.start, self.route.end)
+        return curve
 
-@nb.njit(cache=True)
-def _frames(control: Float) -> Float:
-    """Frame (3, 3) of the direction of motion at each of the SAMPLES * M samples."""
-    segments = control.shape[0] - 3
-    chord = control[control.shape[0] - 1] - control[0]
-    frames = np.empty((SAMPLES * segments, 3, 3))
-    tangent = np.empty(3)
-    for k in range(SAMPLES * segments):
-        m = k // SAMPLES
-        u = (k % SAMPLES + 0.5) / SAMPLES
-        for axis in range(3):
-            d0 = control[m + 1, axis] - control[m, axis]
-            d1 = control[m + 2, axis] - control[m + 1, axis]
-            d2 = control[m + 3, axis] - control[m + 2, axis]
-            tangent[axis] = 0.5 * (1 - u) * (1 - u) * d0 + (0.5 + u - u * u) * d1 + 0.5 * u * u * d2
-        if (tangent * tangent).sum() < 1e-8:
-            tangent[:] = chord
-        frames[k] = _frame(tangent)
-    return frames
+    def improve(self, curve: Curve, rounds: int) -> tuple[Curve, bool, int]:
+        """`Model.improve`."""
+        control, h = curve
+        for count in range(1, rounds + 1):
+            by = self._tethered(control)._replace(h=h)
+            rows, sides = limit_rows(control, h, by.limits, self.route.bounds)
+            step, flag = solve_qp(*quadratic_model(control, by), rows, sides)
+            if flag < 1:
+                return Curve(control, h), False, count
+            control, gained = line_search(control, step.reshape(-1, 3), by)
+            if gained < self.shaper.tolerance:
+                break
+        return Curve(control, h), True, count
 
+    def _tethered(self, control: Float) -> Merit:
+        """Samples tied to the nearest points of the path as found, where this rung or the unknown asks."""
+        known_only, raw, field = self.constraints.known_only, self.route.raw, self.request.field
+        if self.rung.tether == 0.0 and not known_only:
+            return self.merit
+        points = self.merit.position @ control
+        apart = ((points[:, None, :] - raw[None, :, :]) ** 2).sum(axis=2)
+        weight = np.full(len(points), self.rung.tether)
+        if known_only:
+            around = (points[:, None, :] + field.voxel_size_m * _AROUND).reshape(-1, 3)
+            known = field.observed(around).reshape(-1, len(_AROUND)).all(axis=1)
+            weight[~known] += _UNKNOWN_TETHER
+        return self.merit._replace(tether_m=raw[np.argmin(apart, axis=1)], tether_weight=weight)
 
-@nb.njit(cache=True)
-def quadratic_model(
-    control: Float,
-    h: float,
-    energy: Float,
-    position: Float,
-    distance: Float32,
-    origin_m: Float,
-    voxel_m: float,
-    weights: Float,
-    tether_m: Float,
-    tether_weight: Float,
-    limits: Float,
-    movers: Float,
-) -> tuple[Float, Float]:
-    """Hessian (3n, 3n) and gradient (3n,) of the merit over the n = N - 6 free control points.
+    def points(self, curve: Curve) -> Float:
+        """`Model.points`."""
+        points: Float = sample_spline(curve.control, 2 * SAMPLES)
+        return points
 
-    Variable 3 j + axis moves control point 3 + j.
-    """
-    n = control.shape[0] - 6
-    hessian, gradient = np.zeros((3 * n, 3 * n)), np.zeros(3 * n)
-    slope_of_energy = (energy @ control) * (2.0 / h**3)
-    for i in range(n):
-        for axis in range(3):
-            gradient[3 * i + axis] = slope_of_energy[3 + i, axis]
-        for j in range(max(i - 3, 0), min(i + 4, n)):
-            for axis in range(3):
-                hessian[3 * i + axis, 3 * j + axis] = 2.0 * energy[3 + i, 3 + j] / h**3
-    points, frames = _samples(control, position), _frames(control)
-    count = points.shape[0]
-    around = np.empty((7 * count, 3))
-    for k in range(count):
-        around[7 * k] = points[k]
-        for e in range(3):
-            around[7 * k + 1 + 2 * e] = points[k] + voxel_m * frames[k, e]
-            around[7 * k + 2 + 2 * e] = points[k] - voxel_m * frames[k, e]
-    d, _ = value_and_gradient(distance, origin_m, voxel_m, around)
-    _heed(movers, around, 7, h, weights[3], d)
-    slope, bend = np.empty(3), np.empty((3, 3))
-    for k in range(count):
-        slope[:], bend[:] = 0.0, 0.0
-        middle = clearance_cost(d[7 * k], weights[1], weights[2])
-        for e in range(3):
-            ahead = clearance_cost(d[7 * k + 1 + 2 * e], weights[1], weights[2])
-            behind = clearance_cost(d[7 * k + 2 + 2 * e], weights[1], weights[2])
-            first = weights[0] * (ahead - behind) / (2.0 * voxel_m)
-            second = weights[0] * max(ahead - 2.0 * middle + behind, 0.0) / voxel_m**2
-            for a in range(3):
-                slope[a] += first * frames[k, e, a]
-                for b in range(3):
-                    bend[a, b] += second * frames[k, e, a] * frames[k, e, b]
-        if tether_weight[k] > 0.0:
-            for a in range(3):
-                slope[a] += 2.0 * tether_weight[k] * (points[k, a] - tether_m[k, a])
-                bend[a, a] += 2.0 * tether_weight[k]
-        m, share = k // SAMPLES, h / SAMPLES
-        for i in range(max(m - 3, 0), min(m + 1, n)):  # control point 3 + i is one of m .. m + 3
-            wi = share * position[k, 3 + i]
-            for a in range(3):
-                gradient[3 * i + a] += wi * slope[a]
-            for j in range(max(m - 3, 0), min(m + 1, n)):
-                wij = wi * position[k, 3 + j]
-                for a in range(3):
-                    for b in range(3):
-                        hessian[3 * i + a, 3 * j + b] += wij * bend[a, b]
-    for i in range(3 * n):
-        hessian[i, i] += 1e-6
-    return hessian, gradient
+    def excess(self, curve: Curve) -> float:
+        """`Model.excess`; exact."""
+        limits = self.constraints.limits
+        fast, strong = unavoidable(*self.route.start[1:], limits.max_acceleration_mps2, curve.h)
+        top = max(limits.max_speed_mps, fast) * (1.0 + 1e-9)
+        most = max(limits.max_acceleration_mps2, strong) * (1.0 + 1e-9)
+        too_strong: float = peak_acceleration(curve.control, curve.h) / most
+        too_fast: float = peak_speed(curve.control, curve.h) / top
+        return max(too_fast, math.sqrt(too_strong))
 
+    def shortfall(self, curve: Curve) -> str:
+        """`Model.shortfall`, every half voxel."""
+        request, constraints = self.request, self.constraints
+        longest = float(np.linalg.norm(np.diff(curve.control, axis=0), axis=1).max())
+        per_segment = max(math.ceil(longest / (0.5 * request.field.voxel_size_m)), 1)
+        points = sample_spline(curve.control, per_segment)
+        times = request.time_s + np.arange(len(points), dtype=np.float64) * (curve.h / per_segment)
+        strongest = constraints.limits.max_acceleration_mps2
+        fixed = shortfall(request, points, constraints.min_clearance_m, strongest, constraints.known_only)
+        return fixed or self.movers.shortfall(points, times, strongest)
 
-@nb.njit(cache=True)
-def limit_rows(control: Float, h: float, limits: Float, bounds: Float) -> tuple[Float, Float]:
-    """Rows (R, 3n) and right sides (R,) of the QP: speed, acceleration and flight bounds.
-
-    Each norm limit is replaced by half spaces that touch its ball: where the present vector
-    points, and for accelerations also around that. They hold the ball, so a QP without
-    solution means that the limits themselves cannot be kept; an acceleration that turns by up
-    to 36° exceeds its limit by 2.3 % at most. Only vectors beyond 0.6 of their limit, the first
-    accelerations, and control points within 0.5 m of a bound get rows.
-    """
-    count = control.shape[0]
-    rows, sides = np.zeros((20 * count, 3 * (count - 6))), np.empty(20 * count)
-    size = 0
-    stencil = np.array([[-1.0, 1.0, 0.0], [1.0, -2.0, 1.0]])
-    vector, normal = np.empty(3), np.empty(3)
-    for order in range(2):
-        limit = limits[order] * h ** (1 + order)
-        for i in range(2 - order, count - 3):
-            for axis in range(3):
-                vector[axis] = 0.0
-                for j in range(2 + order):
-                    vector[axis] += stencil[order, j] * control[i + j, axis]
-            norm = np.sqrt((vector * vector).sum())
-            hard = order == 1 and i <= _HARD_STARTS
-            if not hard and norm < _NEAR_LIMIT * limit:
-                continue
-            frame = _frame(vector)
-            for turn in range(10 if hard else 1 + 2 * order):
-                sides[size] = limit
-                for axis in range(3):
-                    normal[axis] = (
-                        _FAN[turn, 0] * frame[0, axis]
-                        + _FAN[turn, 1] * frame[1, axis]
-                        + _FAN[turn, 2] * frame[2, axis]
-                    )
-                    sides[size] -= normal[axis] * vector[axis]
-                for j in range(2 + order):
-                    if 3 <= i + j < count - 3:
-                        for axis in range(3):
-                            rows[size, 3 * (i + j - 3) + axis] = stencil[order, j] * normal[axis]
-                size += 1
-    for i in range(3, count - 3):
-        for axis in range(3):
-            for side in range(2):
-                sign = 2.0 * side - 1.0  # -1 at the lower bound, 1 at the upper
-                room = sign * (bounds[side, axis] - control[i, axis])
-                if room < _NEAR_BOUND_M:
-                    rows[size, 3 * (i - 3) + axis] = sign
-                    sides[size] = room
-                    size += 1
-    return rows[:size], sides[:size]
-
-
-@nb.njit(cache=True)
-def line_search(
-    control: Float,
-    step: Float,
-    h: float,
-    energy: Float,
-    position: Float,
-    distance: Float32,
-    origin_m: Float,
-    voxel_m: float,
-    weights: Float,
-    tether_m: Float,
-    tether_weight: Float,
-    limits: Float,
-    movers: Float,
-) -> tuple[Float, float]:
-    """First of a few shares of a QP's step (n, 3) that lowers the merit, and by what share of it.
-
-    `control` (N, 3) are all control points, `step` moves the free ones; the rest: see `merit`.
-    """
-    last = control.shape[0] - 3
-    grid = (distance, origin_m, voxel_m)
-    pull = (weights, tether_m, tether_weight, limits, movers)
-    present = merit(control, h, energy, position, *grid, *pull)
-    share = 1.0
-    for _ in range(4):
-        trial = control.copy()
-        trial[3:last] += share * step
-        value = merit(trial, h, energy, position, *grid, *pull)
-        if value < present:
-            return trial, (present - value) / present
-        share *= 0.4
-    return control, 0.0
+    def trajectory(self, curve: Curve) -> Trajectory:
+        """`Model.trajectory`."""
+        request = self.request
+        return to_trajectory(curve.control, curve.h, request.time_s, request.goal.is_target)

@@ -19,7 +19,7 @@ from uavexp.planner.mpc.horizon import HorizonModel, Motion, Scene, horizon_mode
 from uavexp.planner.mpc.horizon import to_trajectory as motion_trajectory
 from uavexp.planner.mpc.regions import static_planes
 from uavexp.planner.mpc.rejoin import blend, rest_of, state_at
-from uavexp.planner.shape.static_problem import Problem, Settings, local_model, merit
+from uavexp.planner.shape.static_step import Cost, local_model, merit
 from uavexp.planner.spline.uniform import make_uniform, pin_ends, to_trajectory
 from uavexp.trajectory import evaluate
 from uavexp.types import Goal, Limits, PlanRequest, PlanStatus, Tracks
@@ -127,31 +127,27 @@ def test_a_stop_is_repeated_points() -> None:
 def test_gradient_is_the_slope_of_the_cost() -> None:
     """Away from obstacles, where the model of their cost is exact, and within the limits."""
     grid, rng = hall(), np.random.default_rng(3)
-    settings = Settings(
-        order=4,
-        control_weight=1.3,
-        smooth_weight=0.2,
-        static_weight=60.0,
-        min_clearance_m=0.26,
-        safe_clearance_m=0.75,
-        duration_margin=1.1,
-        control_spacing_m=0.6,
-        first_iterations=3,
-        final_iterations=4,
-        z_band_m=0.3,
-        known_only=False,
-        limits=replace(LIMITS, max_speed_mps=1e3, max_acceleration_mps2=1e3),
-    )
     path = np.linspace([2.0, 3.0, 1.2], [8.0, 3.0, 1.2], 50)
-    problem = Problem(make_uniform(3, 12), settings, field_from(grid), bounds(grid), path, 60.0, 5.0)
+    cost = Cost(
+        basis=make_uniform(3, 12),
+        effort_weight=1.3,
+        jerk_weight=0.2,
+        obstacle_weight=60.0,
+        tether=5.0,
+        field=field_from(grid),
+        safe_m=0.75,
+        hard_m=0.31,
+        limits=(1e3, 1e3),
+        bounds=bounds(grid),
+    )
     control = np.linspace([2.0, 3.0, 1.2], [8.0, 3.0, 1.2], 12) + 0.1 * rng.normal(size=(12, 3))
     tied = path[:36]
-    _, gradient = local_model(problem, control, 0.5, tied)
+    _, gradient = local_model(cost, control, 0.5, tied)
     for variable in (0, 4, 17):
         moved = [control.copy(), control.copy()]
         moved[0].reshape(-1)[9 + variable] += 1e-5
         moved[1].reshape(-1)[9 + variable] -= 1e-5
-        up, down = (merit(problem, trial, 0.5, tied) for trial in moved)
+        up, down = (merit(cost, trial, 0.5, tied) for trial in moved)
         assert gradient[variable] == pytest.approx((up - down) / 2e-5, rel=1e-5, abs=1e-5)
 
 
