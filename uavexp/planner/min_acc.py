@@ -46,7 +46,7 @@ from uavexp.planner.find.grid import Finder, PathSearch
 from uavexp.planner.movers.escape import safest_stop
 from uavexp.planner.movers.moving import MovingObstacles
 from uavexp.planner.shape.scp import Scp, load
-from uavexp.planner.shape.start import REST_MPS, state_of
+from uavexp.planner.shape.start import REST_MPS
 from uavexp.planner.shape.stop_first import stop_first, summed
 from uavexp.trajectory import Trajectory, evaluate, sample_times
 from uavexp.types import Limits, PlanRequest, PlanResult, PlanStatus, Tracks
@@ -157,7 +157,8 @@ class MinAcc:
             return self._among_movers(request, movers, search, result)
         speed = float(np.linalg.norm(request.velocity_mps))
         if result.status in _MENDED_BY_BRAKING and speed > REST_MPS:
-            brake = braking_trajectory(request.time_s, *state_of(request), limits)
+            state = (request.position_m, request.velocity_mps, request.acceleration_mps2)
+            brake = braking_trajectory(request.time_s, *state, limits)
             return self._stop_first(request, brake, movers, search, result, "brakes first")
         return result
 

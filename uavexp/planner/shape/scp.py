@@ -177,7 +177,8 @@ class _Cubic:
         for count in range(1, rounds + 1):
             by = self._tethered(control)._replace(h=h)
             rows, sides = limit_rows(control, h, by.limits, self.route.bounds)
-            step, flag = solve_qp(*quadratic_model(control, by), rows, sides)
+            hessian, gradient = quadratic_model(control, by)
+            step, flag = solve_qp(hessian, gradient, rows, sides)
             if flag < 1:
                 return Curve(control, h), False, count
             control, gained = line_search(control, step.reshape(-1, 3), by)
@@ -207,7 +208,8 @@ class _Cubic:
     def excess(self, curve: Curve) -> float:
         """`Model.excess`; exact."""
         limits = self.constraints.limits
-        fast, strong = unavoidable(*self.route.start[1:], limits.max_acceleration_mps2, curve.h)
+        _, velocity, acceleration = self.route.start
+        fast, strong = unavoidable(velocity, acceleration, limits.max_acceleration_mps2, curve.h)
         top = max(limits.max_speed_mps, fast) * (1.0 + 1e-9)
         most = max(limits.max_acceleration_mps2, strong) * (1.0 + 1e-9)
         too_strong: float = peak_acceleration(curve.control, curve.h) / most

@@ -94,12 +94,12 @@ def merit(control: Float, by: Merit) -> float:
 
 
 @nb.njit(cache=True)
-def _felt_m(points: Float, each: int, by: Merit) -> Float32:
+def _felt_m(points: Float, each: int, by: Merit) -> Float:
     """Distances of points, `each` of a sample, to what is mapped, lowered near movers at its instant.
 
     To be just clear of a mover is worth as much as to have the least distance from what is fixed.
     """
-    distance_m, _ = value_and_gradient(by.distance, by.origin_m, by.voxel_m, points)
+    distance_m: Float = value_and_gradient(by.distance, by.origin_m, by.voxel_m, points)[0]
     if by.movers.shape[0] == 0:
         return distance_m
     for n in range(points.shape[0]):
@@ -219,7 +219,7 @@ def around(points: Float, frames: Float, voxel_m: float) -> Float:
 
 @nb.njit(cache=True, inline="always")
 def cost_model(
-    d: Float32, frame: Float, voxel_m: float, weight: float, safe_m: float, hard_m: float,
+    d: Float, frame: Float, voxel_m: float, weight: float, safe_m: float, hard_m: float,
     slope: Float, bend: Float,
 ) -> None:  # fmt: skip
     """Write slope (3,) and non-negative curvature (3, 3) of the weighted cost, of distances (7,) `around`."""
