@@ -8,11 +8,12 @@ is called.
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import importlib
 import inspect
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any, get_args, get_origin
+from typing import TYPE_CHECKING, Any, Protocol, get_args, get_origin, runtime_checkable
 
 from uavexp.config.trust import check_trust, is_trusted
 from uavexp.errors import ConfigError, UavexpError
@@ -45,6 +46,18 @@ TOP_LEVEL: dict[str, Any] = {
     "stuck_s": float,
 }
 TARGET = "_target_"
+
+
+@runtime_checkable
+class NeedsOthers(Protocol):
+    """A component that does not fly with every other one."""
+
+    def requires(self, **parts: Any) -> None:
+        """Raise `ConfigError` unless the trial's other parts are as this one needs them.
+
+        Args:
+            parts: the fields of `uavexp.trial.Parts` by name; it names those that it looks at.
+        """
 
 
 def check_config(config: Mapping[str, Any], options: Mapping[str, str]) -> dict[str, Any]:
@@ -85,8 +98,7 @@ def build(config: Mapping[str, Any]) -> Parts:
         parts = Parts(**components, **{key: config[key] for key in TOP_LEVEL})
     except ArithmeticError as error:
         raise ConfigError(f"a rate or period does not fit the step: {error}") from error
-    _check_monitored_distance(parts)
-    _check_endings(parts)
+    _check_needs(parts)
     return parts
 
 
@@ -108,8 +120,7 @@ def build_component(group: str, tree: Mapping[str, Any], path: str = "") -> Any:
     try:
         component = cls(**arguments)
     except UavexpError as error:
-        about_parameter = str(error).split(" ")[0] in parameter_types(cls)
-        raise ConfigError(f"{path}{'.' if about_parameter else ': '}{error}") from error
+        raise _told(path, cls, error) from error
     except (TypeError, ValueError, ArithmeticError) as error:
         raise ConfigError(f"{path}: {cls.__name__} cannot be made: {error}") from error
     lacking = [name for name in protocol_members(group) if not _has(component, name)]
@@ -216,33 +227,28 @@ def _named_trees(group: str, trees: Any, path: str) -> dict[str, Any]:
     return {str(name): _checked_tree(group, tree, f"{path}.{name}") for name, tree in trees.items()}
 
 
-def _check_monitored_distance(parts: Parts) -> None:
-    """A field truncated below the trigger's radius hides changes inside it (paper 1)."""
-    reach_m = getattr(parts.mapping, "max_distance_m", None)
-    for path, policy in _policies(parts):
-        radius_m = getattr(policy, "monitor_radius_m", None)
-        if radius_m is not None and reach_m is not None and reach_m < radius_m:
-            raise ConfigError(
-                f"mapping.max_distance_m must be >= {path}.monitor_radius_m = {radius_m}, got {reach_m}"
-            )
+def _check_needs(parts: Parts) -> None:
+    """Ask every part that needs something of the others, those inside it too."""
+    others = {item.name: getattr(parts, item.name) for item in dataclasses.fields(parts)}
+    for group in GROUPS:
+        for path, part in _with_inner(group, others[group]):
+            if isinstance(part, NeedsOthers):
+                try:
+                    part.requires(**others)
+                except ConfigError as error:
+                    raise _told(path, type(part), error) from error
 
 
-def _policies(parts: Parts) -> Iterator[tuple[str, Any]]:
-    """The trigger and the policies inside it, each with the path of its parameters."""
-    yield "trigger", parts.trigger
-    for name, policy in getattr(parts.trigger, "policies", {}).items():
-        yield f"trigger.policies.{name}", policy
+def _with_inner(path: str, part: Any) -> Iterator[tuple[str, Any]]:
+    """A component and those it holds, each with the path of its parameters."""
+    yield path, part
+    cls: type = type(part)
+    for key in nested_groups(cls):
+        for name, inner in getattr(part, key).items():
+            yield from _with_inner(f"{path}.{key}.{name}", inner)
 
 
-def _check_endings(parts: Parts) -> None:
-    """Combinations that could only end without having begun."""
-    for path, policy in _policies(parts):
-        interval_s = getattr(policy, "interval_s", 0.0)
-        if interval_s >= parts.stuck_s:
-            raise ConfigError(f"stuck_s must be > {path}.interval_s = {interval_s}, got {parts.stuck_s}")
-    patience_s = getattr(parts.mission, "patience_s", 0.0)
-    if 2.0 * patience_s >= parts.stuck_s:  # a stop is put off once before it is given up
-        raise ConfigError(f"stuck_s must be > 2 mission.patience_s = {2.0 * patience_s}, got {parts.stuck_s}")
-    names = type(parts.mission).__name__, type(parts.explorer).__name__
-    if names == ("Explore", "TargetOnly"):
-        raise ConfigError("mission=explore has no target: it needs explorer=frontier, got target_only")
+def _told(path: str, cls: type, error: UavexpError) -> ConfigError:
+    """What a component said of itself or of a parameter of its own, by its path."""
+    about_parameter = str(error).split(" ")[0] in parameter_types(cls)
+    return ConfigError(f"{path}{'.' if about_parameter else ': '}{error}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 from uavexp.arrays import Float
 from uavexp.types import Goal, Limits, Observation
@@ -11,6 +11,7 @@ from uavexp.types import Goal, Limits, Observation
 class Explorer(Protocol):
     """Chooses goals at `rate_hz`; built fresh for every trial."""
 
+    explores: ClassVar[bool]  # whether it finds goals without a target to fly to
     rate_hz: float
 
     def reset(self, flight_height_m: float, limits: Limits) -> None:

@@ -26,7 +26,7 @@ from __future__ import annotations
 import math
 from dataclasses import field
 from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 
@@ -57,6 +57,7 @@ class Clustering(StrEnum):
 class Frontier:
     """Frontier goals; see the module docstring for the score."""
 
+    explores: ClassVar[bool] = True
     rate_hz: Positive = 5.0  # Hz, goal rate [ours]
     alpha: NonNegative = 0.005  # m per unknown cell: weight of J_info [ours]
     beta: NonNegative = 1.0  # weight of the path length to the goal, J_cost [ours]

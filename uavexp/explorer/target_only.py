@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import field
+from typing import ClassVar
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from uavexp.types import Goal, Limits, Observation
 class TargetOnly:
     """The target, until it is rejected; then again after `set_aside_s`."""
 
+    explores: ClassVar[bool] = False
     rate_hz: Positive = 5.0  # Hz, goal rate
     set_aside_s: NonNegative = 1.0  # s, after a failed plan the target is not tried again for so long [ours]
     _until_s: float = field(init=False, repr=False, default=-1.0)

@@ -14,6 +14,7 @@ class MapBackend(Protocol):
     """Fuses scans into a TSDF and keeps its ESDF; built fresh for every trial."""
 
     voxel_size_m: float
+    max_distance_m: float  # truncation of its field
     esdf_rate_hz: float
 
     def reset(self, bounds_m: Float, scene: Scene) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from uavexp.arrays import Float
-from uavexp.errors import require_non_negative, require_positive
+from uavexp.errors import require, require_non_negative, require_positive
 from uavexp.explorer.base import Explorer
 from uavexp.log import Inspection
 from uavexp.scene import Scene
@@ -27,6 +27,10 @@ class Explore:
     def __post_init__(self) -> None:
         require_positive(patience_s=self.patience_s, time_base_s=self.time_base_s)
         require_non_negative(time_per_area_spm2=self.time_per_area_spm2)
+
+    def requires(self, *, explorer: Explorer, **_: object) -> None:
+        """Refuse an explorer that only flies to a target, of which there is none."""
+        require(explorer.explores, "explore has no target: it needs an explorer that explores (frontier)")
 
     def prepare(self, world: World, rng: np.random.Generator) -> World:
         """The world as it is."""

@@ -167,6 +167,11 @@ class Inspect:
         )
         self._camera(), self._settings(), self._weights()  # each checks what it is made of
 
+    def requires(self, *, stuck_s: float, **_: object) -> None:
+        """Refuse a wait that looks like being stuck; a stop is put off once before it is given up."""
+        wait_s = 2.0 * self.patience_s
+        require(wait_s < stuck_s, f"patience_s must be < stuck_s / 2 = {stuck_s / 2}, got {self.patience_s}")
+
     def prepare(self, world: World, rng: np.random.Generator) -> World:
         """The world with blocks and without what is gone; its reference as it is known."""
         known = world.reference or Surface(

@@ -18,6 +18,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cache, partial
+from typing import ClassVar
 
 import numpy as np
 
@@ -75,6 +76,7 @@ class TourGuide:
         patience_s: longest wait for movers on the way to a stop, in all.
     """
 
+    explores: ClassVar[bool] = True
     plan: InspectionPlan
     camera: Camera
     settings: Settings

@@ -25,7 +25,9 @@ from enum import StrEnum
 import numpy as np
 
 from uavexp.arrays import Float, Int32
+from uavexp.errors import require
 from uavexp.field import DistanceField
+from uavexp.mapping.base import MapBackend
 from uavexp.parameters import Count, NonNegative, Positive, option
 from uavexp.trajectory import Trajectory, evaluate, sample_times
 from uavexp.trigger.change import changed_near
@@ -106,6 +108,14 @@ class Mcr:
     _times_s: Float = field(init=False, repr=False, default_factory=lambda: np.zeros(0))
     _clearance_m: Float = field(init=False, repr=False, default_factory=lambda: np.zeros(0))
     _previous_goal: Goal | None = field(init=False, repr=False, default=None)
+
+    def requires(self, *, mapping: MapBackend, **_: object) -> None:
+        """Refuse a field truncated below the radius: it hides changes inside (paper 1)."""
+        radius_m, reach_m = self.monitor_radius_m, mapping.max_distance_m
+        require(
+            radius_m <= reach_m,
+            f"monitor_radius_m must be <= mapping.max_distance_m = {reach_m}, got {radius_m}",
+        )
 
     def reset(self, limits: Limits) -> None:
         """Begin a trial."""

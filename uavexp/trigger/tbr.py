@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import field
 
+from uavexp.errors import require
 from uavexp.field import DistanceField
 from uavexp.parameters import Positive, option
 from uavexp.trajectory import Trajectory
@@ -17,6 +18,11 @@ class Tbr:
 
     interval_s: Positive = 5.0  # s, T_int; not given in the paper: 72.3 s / 14.6 replans is about 5 s
     _ticks: int = field(init=False, repr=False, default=0)
+
+    def requires(self, *, stuck_s: float, **_: object) -> None:
+        """Refuse a clock that first strikes when the flight has ended for standing still."""
+        interval_s = self.interval_s
+        require(interval_s < stuck_s, f"interval_s must be < stuck_s = {stuck_s}, got {interval_s}")
 
     def reset(self, limits: Limits) -> None:
         """Begin a trial; the clock starts with it."""

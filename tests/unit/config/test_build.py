@@ -150,7 +150,11 @@ def test_a_checked_configuration_builds_again() -> None:
         ("world.size_m=20,12,3", ["world.size_m", "got 20"]),
         ("world.size_m=[20,12]", ["world.size_m", "[20"]),
         ("trigger.judge=pth", ["trigger.judge", "path | region"]),
-        ("mapping.max_distance_m=1.0", ["trigger.monitor_radius_m = 2.0", "got 1.0"]),
+        (
+            "mapping.max_distance_m=1.0",
+            ["trigger.monitor_radius_m must be <=", "max_distance_m = 1.0, got 2.0"],
+        ),
+        ("mission=explore explorer=target_only", ["mission: explore has no target"]),
         ("world=file", ["world.path must be given", "world.path=VALUE"]),
         ("strategy=mcr trigger=tbr", ["contradicts"]),
         (
