@@ -18,7 +18,9 @@ import pyarrow as pa
 from pyarrow import parquet
 from rich.console import Console
 
-from uavexp.report.make import findings, make_report
+from uavexp.config.experiment import list_experiments, read_experiment
+from uavexp.report.contents import Report
+from uavexp.report.make import make_report
 from uavexp.store.study import STUDY, read_study
 from uavexp.store.table import FIRST_OF_REPLANS, REPLANS, TABLE
 
@@ -35,7 +37,7 @@ def write_study(folder: Path, seeds: int = SEEDS) -> None:
             {
                 "name": "mcr/table1",
                 "title": "Synthetic trials",
-                "report": "table1",
+                "report": dict(read_experiment("mcr/table1", list_experiments()["mcr/table1"]).report),
                 "axes": [["arm", ARMS], ["scene", SCENES]],
                 "seeds": list(range(seeds)),
                 "settings": {"primary": "MCR", "time_based": "TBR"},
@@ -101,8 +103,8 @@ def main() -> None:
         writer.start()
         writer.join()
         begin_s = time.perf_counter()
-        found = findings(read_study(folder))
-        console.print(f"{len(found.tables)} tables, {len(found.claims)} claims: ", end="")
+        report = Report(study=read_study(folder))
+        console.print(f"{len(report.tables)} tables, {len(report.judgements)} claims: ", end="")
         console.print(f"{time.perf_counter() - begin_s:.1f} s, peak {peak_mib():.0f} MiB")
         begin_s = time.perf_counter()
         files = make_report(folder)

@@ -12,6 +12,7 @@ import pytest
 
 from tests.folders import DATA
 from uavexp.__main__ import main
+from uavexp.config.experiment import list_experiments, read_experiment
 from uavexp.store.study import STUDY, Study, read_study
 from uavexp.store.table import REPLANS, TABLE, write_table
 
@@ -52,7 +53,7 @@ def made_up(
     trials: pd.DataFrame,
     axes: dict[str, tuple[str, ...]],
     *,
-    report: str = "",
+    report: dict[str, Any] | None = None,
     settings: dict[str, Any] | None = None,
     replans: pd.DataFrame | None = None,
 ) -> Study:
@@ -61,7 +62,7 @@ def made_up(
     content = {
         "name": "",
         "title": "made up",
-        "report": report,
+        "report": report or {},
         "axes": [[name, list(values)] for name, values in axes.items()],
         "seeds": sorted({int(seed) for seed in trials["seed"]}),
         "settings": settings or {},
@@ -72,6 +73,11 @@ def made_up(
     columns = ("trial", "number", "time_s", "effective_s", "cause", "status", "path_change_m", "near_change")
     write_table(folder / REPLANS, _rows(replans) if replans is not None else [], columns)
     return read_study(folder)
+
+
+def shipped(name: str) -> dict[str, Any]:
+    """Tables, figures and claims that an experiment of this repository declares."""
+    return dict(read_experiment(name, list_experiments()[name]).report)
 
 
 def _rows(table: pd.DataFrame) -> list[dict[str, Any]]:

@@ -1,9 +1,9 @@
 """Experiments: the grid and the seeds of one table or figure, `experiments/<paper>/<table>.yaml`.
 
     title: what is compared
-    report: table1                  which report is made of it; none: a summary
     seed: "0:20"
     settings: {primary: MCR}        read by the report
+    tables: [by_metric]             as are figures and claims (`uavexp.report.declared`); none: a summary
     fixed: {latency_s: 0.03}        of every cell
     axes:                           every combination of one entry of each axis
       arm:
@@ -15,9 +15,9 @@
 An entry's values are what would be typed after `=`: text is read by the same parser, so
 `"1,2,5"` are three values and each makes a cell of its own, told apart by the axis
 `setting`. An axis given as the name of another experiment, `scene: mcr/table1`, has the
-entries of that experiment's axis. On the command line an axis picks entries (`arm=MCR,SSP`),
-a key that entries set replaces their values there and nowhere else, and any other key holds
-for every cell.
+entries of that experiment's axis; so have tables, figures and claims. On the command line an
+axis picks entries (`arm=MCR,SSP`), a key that entries set replaces their values there and
+nowhere else, and any other key holds for every cell.
 """
 
 from __future__ import annotations
@@ -34,7 +34,8 @@ from uavexp.parameters import nearest
 from uavexp.paths import experiments_folder
 
 SETTING_AXIS = "setting"  # tells the cells of one entry apart
-_KEYS = ("title", "report", "seed", "settings", "fixed", "axes")
+_REPORT = ("tables", "figures", "claims")
+_KEYS = ("title", "seed", "settings", *_REPORT, "fixed", "axes")
 _OURS = ("seed", "out", "runner", "experiments")  # no part of a cell
 
 
@@ -44,7 +45,7 @@ class Experiment:
 
     name: str  # "mcr/table1"
     title: str
-    report: str  # "" makes a summary
+    report: Mapping[str, Sequence[Any]]  # its tables, figures and claims, those that it names
     seed: str
     settings: Mapping[str, Any]
     fixed: tuple[Setting, ...]
@@ -98,7 +99,7 @@ def read_experiment(name: str, file: Path, *, borrow: bool = True) -> Experiment
     return Experiment(
         name=name,
         title=str(tree.get("title", name)),
-        report=str(tree.get("report", "")),
+        report={key: _listed(name, file, key, tree[key]) for key in _REPORT if key in tree},
         seed=seed,
         settings=_mapping(name, "settings", tree.get("settings", {})),
         fixed=_settings(name, "fixed", tree.get("fixed", {})),
@@ -120,6 +121,16 @@ def _load(name: str, file: Path) -> dict[Any, Any]:
     except (OSError, yaml.YAMLError) as error:
         raise ConfigError(f"experiments={name} cannot be read: {one_line(error)}") from error
     return tree if isinstance(tree, dict) else {}
+
+
+def _listed(name: str, file: Path, key: str, items: Any) -> Sequence[Any]:
+    """Tables, figures or claims, or those of another experiment."""
+    if isinstance(items, str):
+        other = read_experiment(items, file.parent.parent / f"{items}.yaml", borrow=False).report
+        return other.get(key, [])
+    if not isinstance(items, list):
+        raise ConfigError(f"experiments={name}: {key} must be a list, got {items!r}")
+    return items
 
 
 def _borrowed(name: str, file: Path, axis: str, other: str) -> Mapping[str, tuple[Setting, ...]]:

@@ -13,31 +13,12 @@ import pandas as pd
 from uavexp.arrays import Bool, Float, Int
 from uavexp.errors import RecordError
 from uavexp.report import significance, statistics
+from uavexp.report.labels import RATE, Metric
 from uavexp.report.significance import Alternative
 from uavexp.report.statistics import Interval
 
 FEWEST_SCENES = 6  # with fewer, sign flips of scenes cannot give p < 0.05, nor the bootstrap 95 %
-SUCCESS = "success"
 SCENE = "scene"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Metric:
-    """A column of the trials as the report shows it."""
-
-    column: str
-    label: str  # with unit
-    digits: int  # shown
-    better: int = 0  # 1: more is better, -1: less, 0: neither
-    scale: float = 1.0  # shown value over stored value
-    is_count: bool = False  # of events in a flight: bounded also where none occurred
-    # a path cut short by failure is not a shorter path: compared where both arms succeeded, too
-    needs_arrival: bool = False
-
-    @property
-    def is_rate(self) -> bool:
-        """Whether it is a share of trials, not a mean."""
-        return self.column == SUCCESS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,7 +59,11 @@ class Panel:
     scene: Int  # (U,) number of the scene of each row
     scenes: tuple[str, ...]
     flown: Bool  # (U, A) whether the trial exists
-    columns: dict[str, Float] = field(default_factory=dict)  # metric -> (U, A), NaN: does not exist
+    trials: pd.DataFrame  # (N,) whose columns are read when asked
+    place: tuple[Int, Int]  # row and column of each trial
+    together: tuple[Metric, ...] = ()  # resampled together, which is faster than one by one
+    _blocks: dict[str, Float] = field(default_factory=dict)
+    _samples: dict[str, Float] = field(default_factory=dict)
 
     @property
     def scenes_are_units(self) -> bool:
@@ -90,67 +75,71 @@ class Panel:
         """Cluster of each row (U,): its scene, or the same for all where rows are the units."""
         return self.scene if self.scenes_are_units else np.zeros_like(self.scene)
 
+    def has(self, metric: Metric) -> bool:
+        """Whether the trials have this metric."""
+        return metric.column in self.trials
+
+    def block(self, metric: Metric) -> Float:
+        """Values (U, A) as stored; NaN where they do not exist."""
+        if metric.column not in self._blocks:
+            block = np.full(self.flown.shape, math.nan)
+            block[self.place] = self.trials[metric.column].to_numpy(dtype=float, na_value=math.nan)
+            self._blocks[metric.column] = block
+        return self._blocks[metric.column]
+
     def values(self, metric: Metric, arm: str) -> Float:
         """Values (U,) of one arm in the unit shown; NaN where they do not exist."""
-        return self.columns[metric.column][:, self.arms.index(arm)] * metric.scale
+        return self.block(metric)[:, self.arms.index(arm)] * metric.scale
 
     def success(self, arm: str) -> Bool:
         """Whether each trial (U,) of an arm succeeded; a failed or missing one did not."""
-        succeeded: Bool = self.columns[SUCCESS][:, self.arms.index(arm)] == 1.0
+        succeeded: Bool = self.block(RATE)[:, self.arms.index(arm)] == 1.0
         return succeeded
 
     def n(self, arm: str) -> int:
         """Trials of an arm, failed ones included."""
         return int(self.flown[:, self.arms.index(arm)].sum())
 
-    def has(self, metric: Metric) -> bool:
-        """Whether the trials have this metric."""
-        return metric.column in self.columns
-
-    @cached_property
-    def samples(self) -> dict[str, Float]:
-        """Resampled means (B, A) of every metric, all resampled together."""
-        names = list(self.columns)
-        if not names:
-            return {}
-        block = np.concatenate([self.columns[name] for name in names], axis=1)
-        means = statistics.resampled_means(block, self.cluster)
-        return dict(zip(names, np.split(means, len(names), axis=1), strict=True))
+    def samples(self, metric: Metric) -> Float:
+        """Resampled means (B, A) of a metric, of every metric from the same resampled worlds."""
+        if metric.column not in self._samples:
+            asked = self.together if metric in self.together else (metric,)
+            there = [item for item in dict.fromkeys(asked) if self.has(item)]
+            block = np.concatenate([self.block(item) for item in there], axis=1)
+            parts = np.split(statistics.resampled_means(block, self.cluster), len(there), axis=1)
+            self._samples.update(zip((item.column for item in there), parts, strict=True))
+        return self._samples[metric.column]
 
 
 def panel_of(
-    trials: pd.DataFrame, arm_axes: Sequence[str], arms: Sequence[str], metrics: Sequence[Metric]
+    trials: pd.DataFrame, arm_column: str, arms: Sequence[str], *, together: Sequence[Metric] = ()
 ) -> Panel:
-    """Arrange trials by world and arm.
-
-    Args:
-        trials: one row per trial; failed ones included.
-        arm_axes: columns that name the arm together.
-        arms: names in the order wanted (`arm_names`); others are left out.
-        metrics: to carry along; those the trials do not have are left out.
+    """Trials of these arms by world; the column `scene`, where there is one, tells the scenes apart.
 
     Raises:
-        RecordError: two trials of one arm in the same world.
+        RecordError: an arm has two trials with the same scene and seed.
     """
-    scene = trials[SCENE] if SCENE in trials else pd.Series("", index=trials.index)
-    keys = pd.DataFrame({"scene": scene.to_numpy(), "seed": trials["seed"].to_numpy()})
-    column = pd.Index(arms).get_indexer(pd.Index(arm_names(trials, arm_axes)))
-    wanted = column >= 0
-    units = pd.MultiIndex.from_frame(keys[wanted]).unique().sort_values()
-    row = units.get_indexer(pd.MultiIndex.from_frame(keys))
+    column = pd.Index(arms).get_indexer(trials[arm_column])
+    trials, column = trials[column >= 0], column[column >= 0]
+    scene = trials[SCENE].astype(str) if SCENE in trials else pd.Series("", index=trials.index)
+    keys = pd.MultiIndex.from_arrays([scene, trials["seed"]])
+    units = keys.unique().sort_values()
+    place = (units.get_indexer(keys), column)
     flown = np.zeros((len(units), len(arms)), dtype=bool)
-    flown[row[wanted], column[wanted]] = True
-    if flown.sum() != wanted.sum():
-        raise RecordError(f"two trials of one {'/'.join(arm_axes)} with the same scene and seed")
+    flown[place] = True
+    if flown.sum() != len(trials):
+        raise RecordError("two trials of one arm with the same scene and seed")
     names = units.get_level_values(0)
     scenes = tuple(names.unique())
-    panel = Panel(arms=tuple(arms), scenes=scenes, scene=pd.Index(scenes).get_indexer(names), flown=flown)
-    for name in dict.fromkeys([SUCCESS, *(metric.column for metric in metrics)]):
-        if name in trials:
-            block = np.full(flown.shape, math.nan)
-            block[row[wanted], column[wanted]] = trials[name].to_numpy(dtype=float, na_value=math.nan)[wanted]
-            panel.columns[name] = block
-    return panel
+    return Panel(
+        arms=tuple(arms),
+        scene=pd.Index(scenes).get_indexer(names),
+        scenes=scenes,
+        flown=flown,
+        trials=trials,
+        place=place,
+        together=tuple(together),
+    )
 
 
 def arm_names(trials: pd.DataFrame, arm_axes: Sequence[str]) -> pd.Series:
@@ -180,14 +169,14 @@ def estimate(panel: Panel, metric: Metric, arm: str) -> Estimate:
 
 def _interval(panel: Panel, metric: Metric, arm: str) -> Interval:
     column = panel.arms.index(arm)
-    exists = np.isfinite(panel.columns[metric.column][:, column])
+    exists = np.isfinite(panel.block(metric)[:, column])
     cluster = panel.cluster[exists]
     if metric.is_rate:
         low, high = statistics.rate_interval(panel.success(arm)[exists], cluster)
         return Interval(metric.scale * low, metric.scale * high)
     if metric.is_count and not panel.values(metric, arm)[exists].any():
         return statistics.no_event_interval(int(exists.sum()))
-    samples = panel.samples[metric.column][:, column]
+    samples = panel.samples(metric)[:, column]
     return interval_of(metric.scale * samples, statistics.units_of(cluster))
 
 
@@ -229,7 +218,7 @@ def pairs_of(
         scene=panel.scene[rows],
         cluster=panel.cluster[rows],
         scenes_are_units=panel.scenes_are_units,
-        columns={metric.column: panel.columns[metric.column][rows][:, columns] for metric in metrics},
+        columns={metric.column: panel.block(metric)[rows][:, columns] for metric in metrics},
     )
 
 

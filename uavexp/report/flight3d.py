@@ -16,10 +16,10 @@ from uavexp.arrays import Float, Int
 from uavexp.bodies import present
 from uavexp.log import Replan, TrialLog
 from uavexp.metrics import path, replanning, tracking
-from uavexp.report import style
-from uavexp.report.figures import flown
-from uavexp.report.figures.looks import looks_of
-from uavexp.store.study import Study
+from uavexp.report import replan_marks
+from uavexp.report.flights import RULE, SharedWorld, scene_at, shared_world, three_arms
+from uavexp.report.looks import looks_of
+from uavexp.report.results import Results
 from uavexp.types import World
 
 MOST_POINTS = 600  # of a path
@@ -37,20 +37,20 @@ _OTHER_SYMBOL = "cross"
 Json = dict[str, Any]
 
 
-def section(study: Study) -> str:
+def section(results: Results) -> str:
     """The part of the page with the flights of one world.
 
     Raises:
         RecordError: no such flights are stored, or they are damaged.
     """
-    shared = _shown(study)
+    shared = shared_world(results, three_arms(results), scene_at(results, "first"))
     script = plotly_file()
     if script is None:
         return (
             "<p>This view needs plotly where the report is made: <code>pip install plotly</code>, then "
             "<code>python -m uavexp.report</code> with this folder again.</p>"
         )
-    data = json.dumps(payload(study, shared), sort_keys=True, separators=(",", ":"), allow_nan=False)
+    data = json.dumps(payload(results, shared), sort_keys=True, separators=(",", ":"), allow_nan=False)
     data = data.replace("</", "<\\/")  # nothing in it may end the script element
     buttons = "\n".join(f'<button data-arm="{escape(arm)}">{escape(arm)}</button>' for arm in shared.logs)
     asset = Path(__file__).with_name("assets") / "flight3d.js"
@@ -67,16 +67,9 @@ def section(study: Study) -> str:
 {asset.read_text(encoding="utf-8")}</script>"""
 
 
-def _shown(study: Study) -> flown.SharedWorld:
-    """The world of figure 3."""
-    flights = flown.flights_of(study)
-    scenes, arms = flown.scenes_of(study, flights), flown.three_arms(study)
-    return flown.shared_world(study, flown.stored(study, flights), arms, scenes[0])
-
-
-def _caption(shared: flown.SharedWorld) -> str:
+def _caption(shared: SharedWorld) -> str:
     return (
-        f"The same world for every strategy ({shared.where}; {flown.RULE}). Coloured: what the vehicle's map "
+        f"The same world for every strategy ({shared.where}; {RULE}). Coloured: what the vehicle's map "
         "held as occupied at the end, cut above the flight. Line: flown path; dashes: reference; markers: "
         "replans by cause. Drag to turn, scroll to zoom, hover for numbers."
     )
@@ -95,18 +88,18 @@ def _packed(data: bytes) -> str:
     return base64.b64encode(gzip.compress(data, compresslevel=9, mtime=0)).decode("ascii")
 
 
-def payload(study: Study, shared: flown.SharedWorld) -> Json:
+def payload(results: Results, shared: SharedWorld) -> Json:
     """What the script draws.
 
     Args:
-        study: of the flights.
+        results: of the study.
         shared: the world and its flights.
 
     Returns:
         Plain data; lengths in m, times in s.
     """
     world = shared.world
-    looks = looks_of(study, flown.arms_of(study))
+    looks = looks_of(results, results.arms)
     return {
         "start": _numbers(world.start_m),
         "target": _numbers(world.target_m),
@@ -172,7 +165,7 @@ def _replan(number: int, replan: Replan) -> Json:
     return {
         "at": _numbers(replan.position_m),
         "cause": replan.cause,
-        "colour": style.cause_mark(replan.cause).colour,
+        "colour": replan_marks.cause_mark(replan.cause).colour,
         "symbol": _SYMBOLS.get(replan.cause, _OTHER_SYMBOL),
         "hover": f"replan {number}: {replan.cause}<br>{replan.time_s:.1f} s{moved}{changed}",
     }

@@ -13,10 +13,11 @@ import pandas as pd
 from uavexp.errors import RecordError
 from uavexp.report import flight3d
 from uavexp.report.comparison import SCENE
-from uavexp.report.figures import flown, missing
-from uavexp.report.findings import OK, circumstances, study_panel
-from uavexp.report.parts import Claim, Drawing, Table, Verdict
-from uavexp.report.shown import RATE
+from uavexp.report.contents import Judgement, Report, missing
+from uavexp.report.figures.base import Drawing
+from uavexp.report.judges import Verdict
+from uavexp.report.results import ARM, OK, Results
+from uavexp.report.tables.base import Table
 from uavexp.store.records import PICTURE, write_text
 from uavexp.store.study import TRIALS, Study, read_runs, read_wall
 from uavexp.store.table import TABLE
@@ -27,19 +28,12 @@ _NOT_REPEATED = ("out=", "runner.")  # parts of a command that are no part of wh
 
 
 def write_html(
-    study: Study,
-    tables: Sequence[Table],
-    claims: Sequence[Claim],
-    drawings: Sequence[tuple[Drawing, Path]],
-    path: Path,
-    left_out: Sequence[str] = (),
+    report: Report, drawings: Sequence[tuple[Drawing, Path]], path: Path, left_out: Sequence[str] = ()
 ) -> None:
     """Write the page of a report; the same study gives the same bytes.
 
     Args:
-        study: what was flown.
-        tables: in the order of the page.
-        claims: with their verdicts.
+        report: of a study.
         drawings: finished figures with their PNG files.
         path: of the page. Pictures of trials and pdf figures are linked relative to the study.
         left_out: sentences: which figure is left out, and why.
@@ -48,24 +42,25 @@ def write_html(
         RecordError: it cannot be written.
     """
     try:
-        flight = flight3d.section(study)
+        flight = flight3d.section(report.results)
     except RecordError as error:
-        flight, left_out = "", [*left_out, missing("a flight in 3D", error, study)]
+        flight, left_out = "", [*left_out, missing("a flight in 3D", error, report.study)]
     sections = {
-        "Result": "\n".join(map(_table, tables[:1])),
-        "Verdicts": _claims(claims) if claims else "",
+        "Result": "\n".join(map(_table, report.tables[:1])),
+        "Verdicts": _claims(report.judgements) if report.judgements else "",
         "Figures": "\n".join(
             [*(_figure(drawing, png) for drawing, png in drawings), *(_paragraph(line) for line in left_out)]
         ),
         "A flight in 3D": flight,
-        "Further tables": "\n".join(map(_table, tables[1:])),
-        "Failed trials": _failed(study),
+        "Further tables": "\n".join(map(_table, report.tables[1:])),
+        "Failed trials": _failed(report.results),
     }
     shown = {title: text for title, text in sections.items() if text}
-    write_text(path, _page(study, shown))
+    write_text(path, _page(report.results, shown))
 
 
-def _page(study: Study, sections: Mapping[str, str]) -> str:
+def _page(results: Results, sections: Mapping[str, str]) -> str:
+    study = results.study
     title = escape(study.title or study.name or "Flown trials")
     links = " ".join(f'<a href="#{_anchor(name)}">{escape(name)}</a>' for name in sections)
     body = "\n".join(
@@ -84,7 +79,7 @@ def _page(study: Study, sections: Mapping[str, str]) -> str:
 <body>
 <header>
 <h1>{title}</h1>
-{_what_was_flown(study)}
+{_what_was_flown(results)}
 <nav>{links}</nav>
 </header>
 <main>
@@ -110,8 +105,8 @@ def _anchor(name: str) -> str:
     return name.lower().replace(" ", "-")
 
 
-def _what_was_flown(study: Study) -> str:
-    notes = circumstances(study, study_panel(study, (RATE,)))
+def _what_was_flown(results: Results) -> str:
+    study, notes = results.study, results.notes
     axes = "; ".join(f"{axis}: {', '.join(values)}" for axis, values in study.axes.items())
     commands = "\n".join(_code(command) for command in _commands(study))
     return f"<p>{escape(' '.join(notes))}</p>\n<p>{escape(axes)}.</p>\n{commands}"
@@ -138,7 +133,7 @@ def _code(command: str) -> str:
     return f'<p class="command"><code>{escape(command)}</code><button class="copy">copy</button></p>'
 
 
-def _claims(claims: Sequence[Claim]) -> str:
+def _claims(claims: Sequence[Judgement]) -> str:
     counts = ", ".join(
         f"{sum(claim.verdict is verdict for claim in claims)} {verdict}" for verdict in Verdict
     )
@@ -187,9 +182,9 @@ def _relative(file: Path) -> str:
     return f"{file.parent.name}/{file.name}"
 
 
-def _failed(study: Study) -> str:
+def _failed(results: Results) -> str:
     """Every trial without success: what became of it, its picture, and the command that repeats it."""
-    flights = flown.flights_of(study)
+    study, flights = results.study, results.trials
     failed = flights[~flights["success"].astype(bool)]
     if failed.empty:
         return "<p>Every trial succeeded.</p>"
@@ -211,7 +206,7 @@ def _failed_row(study: Study, row: Mapping[Any, Any]) -> str:
     there = (folder / PICTURE).is_file()
     link = f'<a href="{TRIALS}/{escape(str(row["trial"]))}/{PICTURE}">picture</a>' if there else "not kept"
     cells = (
-        escape(str(row[flown.ARM])),
+        escape(str(row[ARM])),
         escape(str(row[SCENE])),
         str(row["seed"]),
         escape(" ".join(_ending(row))),

@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import IO, Any
 
 from uavexp.errors import RecordError
-from uavexp.report import arms, policies, robustness, style, summary, table1, tables, tradeoff
-from uavexp.report.findings import Findings
-from uavexp.report.parts import Drawing, Table
+from uavexp.report import style, table_formats
+from uavexp.report.contents import Report
+from uavexp.report.figures.base import Drawing
+from uavexp.report.tables.base import Table
 from uavexp.store.records import RECORD, write_atomically, write_text
 from uavexp.store.study import Study, collect, read_study, trial_folders
 from uavexp.store.table import REPLANS, TABLE
@@ -29,15 +30,6 @@ DPI = 200
 _METADATA: dict[str, dict[str, Any]] = {
     "png": {"Software": None},
     "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
-}
-
-_KINDS: dict[str, Callable[[Study], Findings]] = {
-    "table1": table1.findings,
-    "tradeoff": tradeoff.findings,
-    "policies": policies.findings,
-    "robustness": robustness.findings,
-    "arms": arms.findings,
-    "": summary.findings,
 }
 
 Say = Callable[[str], None]
@@ -56,18 +48,15 @@ def make_report(folder: Path, say: Say = lambda line: None, warn: Say | None = N
 
     Raises:
         RecordError: no study, a damaged one, or one without a trial.
+        ConfigError: it names a table, figure, judge or metric that does not exist.
     """
     study = read_study(folder)
     _bring_up_to_date(study, say)
     if study.trials.empty:
         raise RecordError(f"{folder} holds no trial yet")
     say(f"{len(study.trials)} trials: tables")
-    found = findings(study)
-    files = [
-        *_write_tables(found, folder),
-        *_write_claims(found, folder),
-        *_write_figures_and_page(study, found, say, warn or say),
-    ]
+    report = Report(study=study)
+    files = [*_write_tables(report, folder), *_write_figures_and_page(report, say, warn or say)]
     _remove_stale(folder, files)
     return files
 
@@ -81,18 +70,6 @@ def _remove_stale(folder: Path, files: Iterable[Path]) -> None:
         if name not in made and _OWN.fullmatch(name):
             (folder / name).unlink(missing_ok=True)
     write_text(manifest, "".join(f"{name}\n" for name in sorted(made)))
-
-
-def findings(study: Study) -> Findings:
-    """Tables and verdicts of a study by its kind of report, nothing written.
-
-    Raises:
-        RecordError: the kind is unknown.
-    """
-    if study.report not in _KINDS:
-        known = " | ".join(sorted(kind for kind in _KINDS if kind))
-        raise RecordError(f"report must be {known} or empty, got {study.report!r} in {study.folder}")
-    return _KINDS[study.report](study)
 
 
 def _bring_up_to_date(study: Study, say: Say) -> None:
@@ -109,12 +86,14 @@ def _bring_up_to_date(study: Study, say: Say) -> None:
     collect(study.folder)
 
 
-def _write_tables(found: Findings, folder: Path) -> Iterator[Path]:
+def _write_tables(report: Report, folder: Path) -> Iterator[Path]:
     _make_folder(folder / TABLES)
-    for table in found.tables:
+    for table in report.tables:
         yield from _write_table(table, folder / TABLES / table.name)
-    for table in found.values:
-        yield _write(folder / TABLES / f"{table.name}.csv", tables.to_csv(table))
+    yield _write(folder / TABLES / f"{report.values.name}.csv", table_formats.to_csv(report.values))
+    if report.judgements:
+        yield _write(folder / f"{CLAIMS}.csv", table_formats.to_csv(report.claims))
+        yield _write(folder / f"{CLAIMS}.md", table_formats.to_markdown(report.claims))
 
 
 def _make_folder(folder: Path) -> None:
@@ -126,18 +105,11 @@ def _make_folder(folder: Path) -> None:
 
 def _write_table(table: Table, stem: Path) -> Iterator[Path]:
     for suffix, text in (
-        ("csv", tables.to_csv(table)),
-        ("md", tables.to_markdown(table)),
-        ("tex", tables.to_latex(table)),
+        ("csv", table_formats.to_csv(table)),
+        ("md", table_formats.to_markdown(table)),
+        ("tex", table_formats.to_latex(table)),
     ):
         yield _write(stem.with_name(f"{stem.name}.{suffix}"), text)
-
-
-def _write_claims(found: Findings, folder: Path) -> Iterator[Path]:
-    if found.claims:
-        table = tables.claims_table(found.claims, found.rule)
-        yield _write(folder / f"{CLAIMS}.csv", tables.to_csv(table))
-        yield _write(folder / f"{CLAIMS}.md", tables.to_markdown(table))
 
 
 def _write(path: Path, text: str) -> Path:
@@ -145,28 +117,22 @@ def _write(path: Path, text: str) -> Path:
     return path
 
 
-def _write_figures_and_page(study: Study, found: Findings, say: Say, warn: Say) -> Iterator[Path]:
-    from uavexp.report.figures import drawings_of
+def _write_figures_and_page(report: Report, say: Say, warn: Say) -> Iterator[Path]:
     from uavexp.report.html import write_html
 
-    _make_folder(study.folder / FIGURES)
+    folder = report.study.folder
+    _make_folder(folder / FIGURES)
     drawn: list[tuple[Drawing, Path]] = []
     left_out: list[str] = []
-    for drawing in _told(drawings_of(study, left_out.append), say):
-        png, pdf = _write_figure(drawing, study.folder / FIGURES)
+    for drawing in report.drawings(left_out.append, say):
+        png, pdf = _write_figure(drawing, folder / FIGURES)
         drawn.append((drawing, png))
         yield from (png, pdf)
     say("page")
     for line in left_out:
         warn(line)
-    write_html(study, found.tables, found.claims, drawn, study.folder / PAGE, left_out)
-    yield study.folder / PAGE
-
-
-def _told(drawings: Iterable[Drawing], say: Say) -> Iterator[Drawing]:
-    for drawing in drawings:
-        say(f"figure {drawing.name}")
-        yield drawing
+    write_html(report, drawn, folder / PAGE, left_out)
+    yield folder / PAGE
 
 
 def _write_figure(drawing: Drawing, folder: Path) -> tuple[Path, Path]:

@@ -17,7 +17,8 @@ from matplotlib.patches import Patch
 
 from uavexp.log import TrialLog
 from uavexp.metrics import replanning
-from uavexp.report import inspection_view, movers_view, page, plan_view, style
+from uavexp.report import inspection_view, movers_view, plan_view, replan_marks, style
+from uavexp.report.picture_layout import LEFT_IN, WIDTH_IN, Page, lay_out
 from uavexp.types import World
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ def draw(world: World, log: TrialLog, metrics: Values, title: str, path: Path | 
         inspects = inspection_view.is_inspection(log)
         near_miss_m = _number(metrics, "near_miss_distance_m")
         movers = movers_view.handles(log, near_miss_m)
-        sheet = page.lay_out((float(size_m[0]), float(size_m[1])), len(movers))
+        sheet = lay_out((float(size_m[0]), float(size_m[1])), len(movers))
         FigureCanvasAgg(sheet.figure)
         draw_plan = inspection_view.draw if inspects else plan_view.draw
         speed_scale = draw_plan(sheet.plan, world, log, view)
@@ -115,10 +116,12 @@ def _draw_tracking(axes: Axes, log: TrialLog) -> None:
     size_pt = plan_view.marker_size_pt(log) - 1.5
     top: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "clip_on": False, "zorder": 5}
     for replan in replanning.failed(log):
-        axes.plot(replan.time_s, 1.0, **style.failed_marker(replan.cause, size_pt), **top)
+        axes.plot(replan.time_s, 1.0, **replan_marks.failed_marker(replan.cause, size_pt), **top)
     for replan in replanning.executed(log):
-        axes.axvline(replan.time_s, color=style.cause_mark(replan.cause).colour, lw=0.7, alpha=0.8, zorder=1)
-        axes.plot(replan.time_s, 1.0, **style.marker(replan.cause, size_pt), **top)
+        axes.axvline(
+            replan.time_s, color=replan_marks.cause_mark(replan.cause).colour, lw=0.7, alpha=0.8, zorder=1
+        )
+        axes.plot(replan.time_s, 1.0, **replan_marks.marker(replan.cause, size_pt), **top)
     axes.set_ylim(bottom=0.0)
     axes.set(xlabel="time [s]", ylabel="tracking error [m]")
     _finish_panel(axes, log, legend=False)
@@ -156,7 +159,7 @@ def _handles(world: World, log: TrialLog) -> list[Line2D | Patch]:
 
 
 def _draw_legend(
-    sheet: page.Page, handles: list[Line2D | Patch], corner: tuple[float, float], columns: int
+    sheet: Page, handles: list[Line2D | Patch], corner: tuple[float, float], columns: int
 ) -> None:
     sheet.figure.legend(
         handles=handles,
@@ -174,7 +177,7 @@ def _event_handles(log: TrialLog) -> list[Line2D]:
     taken = Counter(replan.cause for replan in replanning.executed(log))
     failed = len(replanning.failed(log))
     handles = [
-        Line2D([], [], label=f"replan: {cause} ({count})", **style.marker(cause, 8.0))
+        Line2D([], [], label=f"replan: {cause} ({count})", **replan_marks.marker(cause, 8.0))
         for cause, count in taken.items()
     ]
     if failed:
@@ -190,10 +193,10 @@ def _event_handles(log: TrialLog) -> list[Line2D]:
     return [*handles, *plan_view.contact_handles(log)]
 
 
-def _draw_header(sheet: page.Page, world: World, log: TrialLog, metrics: Values, title: str) -> None:
+def _draw_header(sheet: Page, world: World, log: TrialLog, metrics: Values, title: str) -> None:
     """Write what was flown, how it ended, the key numbers, and the command that repeats it."""
     height_in = sheet.figure.get_figheight()
-    left = page.LEFT_IN / page.WIDTH_IN
+    left = LEFT_IN / WIDTH_IN
     names = [str(metrics[name]) for name in ("strategy",) if name in metrics] + [world.name]
     names += [f"seed {metrics['seed']}"] if "seed" in metrics else []
     ending = str(log.outcome) + (

@@ -14,7 +14,7 @@ from matplotlib.ticker import MultipleLocator
 from uavexp.arrays import Float
 from uavexp.log import TrialLog
 from uavexp.metrics import replanning
-from uavexp.report import movers_view, section, style
+from uavexp.report import cross_section, movers_view, replan_marks, style
 from uavexp.types import World
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ def draw_truth(axes: Axes, world: World, free_m: Float) -> None:
     """
     extent_m = float(np.max(world.bounds_m[1, :2] - world.bounds_m[0, :2]))
     cell_m = max(LEAST_CELL_M, extent_m / MOST_CELLS)
-    plan = section.cut(world, band_m(world), free_m, cell_m)
+    plan = cross_section.cut(world, band_m(world), free_m, cell_m)
     axes.imshow(
         plan.cells.T,
         cmap=ListedColormap(["#FFFFFF", style.SOLID, style.SURFACE]),
@@ -146,9 +146,9 @@ def draw_path(axes: Axes, log: TrialLog) -> Normalize:
 def _draw_events(axes: Axes, log: TrialLog) -> None:
     size_pt = marker_size_pt(log)
     for replan in replanning.failed(log):
-        axes.plot(*replan.position_m[:2], zorder=7, **style.failed_marker(replan.cause, size_pt))
+        axes.plot(*replan.position_m[:2], zorder=7, **replan_marks.failed_marker(replan.cause, size_pt))
     for replan in replanning.executed(log):
-        axes.plot(*replan.position_m[:2], zorder=7.1, **style.marker(replan.cause, size_pt))
+        axes.plot(*replan.position_m[:2], zorder=7.1, **replan_marks.marker(replan.cause, size_pt))
     draw_contacts(axes, log)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any
 
 import matplotlib
@@ -24,48 +23,6 @@ SURFACE = "#B4B4B4"  # true obstacles' surfaces
 SOLID = "#E8E8E8"  # inside them, or shut off from the flight
 MAPPED = "#2A2A2A"  # occupied voxels of the vehicle's map
 FAINT = "#C8C8C8"  # grid lines, frames
-
-
-@dataclass(frozen=True, slots=True)
-class Mark:
-    """How one cause of replanning is drawn: never by colour alone."""
-
-    colour: str
-    marker: str
-
-
-CAUSE_MARKS = {
-    "map": Mark(ORANGE, "^"),
-    "goal": Mark(GREEN, "D"),
-    "clock": Mark(PURPLE, "s"),
-    "distance": Mark(SKY, "o"),
-    "collision": Mark(VERMILLION, "X"),
-    "covered": Mark(BLUE, "p"),
-    "expired": Mark(YELLOW, "h"),
-    "arrival": Mark("#8C6D31", "<"),
-    "brake": Mark(BLACK, "v"),
-    "risk": Mark(WINE, ">"),
-}
-OTHER_MARK = Mark("#606060", "P")
-
-
-def cause_mark(cause: str) -> Mark:
-    """Return how a replan of this cause is drawn."""
-    return CAUSE_MARKS.get(cause, OTHER_MARK)
-
-
-def marker(cause: str, size_pt: float) -> dict[str, Any]:
-    """Line2D settings of a replan that took effect."""
-    look = cause_mark(cause)
-    fill = {"color": look.colour, "mec": "white", "mew": 0.6}
-    return {"marker": look.marker, "ls": "", "ms": size_pt, **fill}
-
-
-def failed_marker(cause: str, size_pt: float) -> dict[str, Any]:
-    """Line2D settings of a request that brought no plan: the same, hollow."""
-    look = cause_mark(cause)
-    hollow = {"color": look.colour, "mfc": "white", "mew": 1.2}
-    return {"marker": look.marker, "ls": "", "ms": 0.8 * size_pt, **hollow}
 
 
 def contact_marker(with_mover: bool, size_pt: float) -> dict[str, Any]:

@@ -57,7 +57,7 @@ class Study:
     folder: Path
     name: str  # experiment, e.g. "mcr/table1"; "" for a command without one
     title: str
-    report: str  # which report is made of it: table1, tradeoff, policies, robustness, "" (a summary)
+    report: dict[str, Any]  # its tables, figures and claims (`uavexp.report.declared`); none: a summary
     axes: dict[str, tuple[str, ...]]
     seeds: tuple[int, ...]
     settings: dict[str, Any]  # free values of the experiment's file for its report, e.g. primary arm
@@ -107,7 +107,7 @@ def read_study(folder: Path) -> Study:
             folder=folder,
             name=text["name"],
             title=text["title"],
-            report=text["report"],
+            report=dict(text["report"]),
             axes={name: tuple(values) for name, values in text["axes"]},
             seeds=tuple(text["seeds"]),
             settings=text["settings"],

@@ -124,7 +124,7 @@ def _study(command: Command, folder: Path, identities: list[dict[str, Any]]) -> 
         folder=folder,
         name=experiment.name if experiment else "",
         title=experiment.title if experiment else "",
-        report=experiment.report if experiment else "",
+        report=dict(experiment.report) if experiment else {},
         axes=command.axes,
         seeds=tuple(sorted(command.seeds)),
         settings=dict(experiment.settings) if experiment else {},

@@ -27,10 +27,10 @@ def _draw_something() -> None:
     """Let matplotlib load its fonts."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    from uavexp.report import page, style
+    from uavexp.report import picture_layout, style
 
     with style.house_style():
-        sheet = page.lay_out((20.0, 10.0))
+        sheet = picture_layout.lay_out((20.0, 10.0))
         FigureCanvasAgg(sheet.figure)
         sheet.plan.set_title("uavexp")
         sheet.figure.savefig(io.BytesIO(), format="png")

@@ -14,7 +14,7 @@ from uavexp.errors import ConfigError
 SHIPPED = list_experiments()
 TEXT = """
 title: Two ways
-report: table1
+tables: [by_metric]
 seed: "0:3"
 fixed: {latency_s: 0.05}
 axes:
@@ -151,17 +151,19 @@ def test_an_axis_may_not_hide_a_key(tmp_path: Path) -> None:
         Composer(user_folder=tmp_path).command(parse_settings(["experiments=own/bad"]))
 
 
-def test_the_levels_that_the_robustness_report_judges_are_flown() -> None:
-    experiment = read_experiment("mcr/noise_latency_drift", SHIPPED["mcr/noise_latency_drift"])
-    settings, axes = experiment.settings, experiment.axes
-    for name, axis in {
-        "small_noise": "noise",
-        "moderate_latency": "latency",
-        "severe_drift": "drift",
-    }.items():
-        assert settings[name] in axes[axis]
-        assert settings["none"][axis] in axes[axis]
-        assert settings[name] != settings["none"][axis]
+def test_a_report_is_a_list_or_that_of_another_experiment(tmp_path: Path) -> None:
+    folder = tmp_path / "experiments" / "own"
+    folder.mkdir(parents=True)
+    axes = "axes: {arm: {a: {strategy: mcr}}}"
+    (folder / "one.yaml").write_text(f"tables: [by_arm]\n{axes}")
+    (folder / "two.yaml").write_text(f"tables: own/one\nfigures: [success]\n{axes}")
+    assert read_experiment("own/two", folder / "two.yaml").report == {
+        "tables": ["by_arm"],
+        "figures": ["success"],
+    }
+    (folder / "bad.yaml").write_text(f"claims: {{says: this}}\n{axes}")
+    with pytest.raises(ConfigError, match="claims must be a list"):
+        read_experiment("own/bad", folder / "bad.yaml")
 
 
 @pytest.mark.parametrize("name", sorted(SHIPPED))

@@ -8,9 +8,8 @@ from pathlib import Path
 import pytest
 
 from uavexp.paths import experiments_folder
-from uavexp.report.figures import drawings_of
-from uavexp.report.make import findings
-from uavexp.report.tables import claims_table, to_csv
+from uavexp.report.contents import Report
+from uavexp.report.table_formats import to_csv
 from uavexp.store.study import STUDY, read_study
 
 STUDIES = sorted(file.parent for file in experiments_folder().glob(f"*/results/*/{STUDY}"))
@@ -23,10 +22,10 @@ def name_of(folder: Path) -> str:
 
 @pytest.mark.parametrize("folder", STUDIES, ids=name_of)
 def test_tables_and_claims_are_those_committed(folder: Path) -> None:
-    found = findings(read_study(folder))
-    texts = {f"tables/{table.name}.csv": to_csv(table) for table in (*found.tables, *found.values)}
-    if found.claims:
-        texts["claims.csv"] = to_csv(claims_table(found.claims, found.rule))
+    report = Report(study=read_study(folder))
+    texts = {f"tables/{table.name}.csv": to_csv(table) for table in (*report.tables, report.values)}
+    if report.judgements:
+        texts["claims.csv"] = to_csv(report.claims)
     committed = {str(file.relative_to(folder)): file.read_text() for file in folder.rglob("*.csv")}
     if not committed:
         pytest.skip("only figures are committed")
@@ -44,5 +43,5 @@ def test_policies_of_any_number_of_causes_are_drawn(name: str) -> None:
     """Used to end with KeyError: 'replans_other'."""
     paper, study = name.split("/")
     folder = experiments_folder() / paper / "results" / study
-    drawn = {drawing.name for drawing in drawings_of(read_study(folder))}
+    drawn = {drawing.name for drawing in Report(study=read_study(folder)).drawings()}
     assert drawn == {file.stem for file in (folder / "figures").glob("*.png")}

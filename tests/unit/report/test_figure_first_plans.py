@@ -8,9 +8,9 @@ import pytest
 from tests.logs import changed, make_log, make_world, still_curve
 from tests.unit.metrics.test_metrics_plan import cubic
 from tests.unit.planner.find.tree.test_tree import plan
-from uavexp.report.figures.flown import SharedWorld
-from uavexp.report.figures.looks import Look
-from uavexp.report.figures.plans import first_plans
+from uavexp.report.figures.first_plans import draw
+from uavexp.report.flights import SharedWorld
+from uavexp.report.looks import Look
 
 LOOKS = {name: Look(colour, "o", "-") for name, colour in (("a", "C0"), ("b", "C1"))}
 
@@ -23,7 +23,7 @@ def shared(**logs):
 
 def test_profiles_are_the_norms_of_the_plan_below_their_limits() -> None:
     """x = t³/6 over 4 s: speed t²/2, acceleration t."""
-    drawing = first_plans(shared(a=cubic()), LOOKS)
+    drawing = draw("first_plans", shared(a=cubic()), LOOKS)
     assert drawing is not None
     _, speed, acceleration = drawing.figure.axes
     for axes, value in ((speed, lambda t: t**2 / 2), (acceleration, lambda t: t)):
@@ -36,7 +36,7 @@ def test_profiles_are_the_norms_of_the_plan_below_their_limits() -> None:
 def test_the_tree_is_of_the_first_arm_that_has_one() -> None:
     edges = np.array([[[0.0, 6.0, 1.2], [1.0, 6.0, 1.2]]], dtype=np.float32)
     with_tree = changed(cubic(), plan_tree_m=edges)
-    drawing = first_plans(shared(a=cubic(), b=with_tree), LOOKS)
+    drawing = draw("first_plans", shared(a=cubic(), b=with_tree), LOOKS)
     assert drawing is not None
     assert "tree that b ended with" in drawing.caption
     drawn = [part for part in drawing.figure.axes[0].collections if len(part.get_segments()) == 1]
@@ -44,7 +44,7 @@ def test_the_tree_is_of_the_first_arm_that_has_one() -> None:
 
 
 def test_without_a_plan_there_is_nothing_to_draw() -> None:
-    assert first_plans(shared(a=make_log(still_curve(), still_curve())), LOOKS) is None
+    assert draw("first_plans", shared(a=make_log(still_curve(), still_curve())), LOOKS) is None
 
 
 def test_df_bitstar_hands_its_tree_over() -> None:

@@ -18,7 +18,7 @@ from uavexp.bodies import ABSENT_M
 from uavexp.log import Contact, TrialLog
 from uavexp.metrics import evaluate
 from uavexp.metrics.tracking_movers import near_misses
-from uavexp.report import flight3d, movers_view, page, picture, plan_view, shown
+from uavexp.report import flight3d, labels, movers_view, picture, picture_layout, plan_view
 from uavexp.report.flight3d import _movers
 from uavexp.types import Shape
 
@@ -65,7 +65,7 @@ def flight(**fields) -> TrialLog:
 
 
 def axes_of(size_m=(20.0, 12.0)):
-    return page.lay_out(size_m).plan
+    return picture_layout.lay_out(size_m).plan
 
 
 class TestPaths:
@@ -316,6 +316,6 @@ def test_every_metric_of_movers_has_its_line_in_the_report():
     measured = set(evaluate(log, make_world([]))) - set(
         evaluate(make_log(straight, straight_velocity), make_world([]))
     )
-    assert {metric.column for metric in shown.MOVERS} == measured - {"near_miss_distance_m"}
-    assert all(shown.BY_COLUMN[metric.column] is metric for metric in shown.MOVERS)
-    assert "replans_risk" in shown.CAUSES
+    assert {metric.column for metric in labels.MOVERS} == measured - {"near_miss_distance_m"}
+    assert labels.metrics_of(metric.column for metric in labels.MOVERS) == labels.MOVERS
+    assert "replans_risk" in labels.CAUSE_COLUMNS

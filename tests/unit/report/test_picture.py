@@ -12,7 +12,7 @@ import pytest
 from tests.logs import empty_log, make_log, make_replan, make_world
 from uavexp.log import Contact, TrialLog
 from uavexp.metrics import evaluate
-from uavexp.report import page, plan_view, section
+from uavexp.report import cross_section, picture_layout, plan_view
 from uavexp.report.picture import draw
 from uavexp.types import Outcome, World
 
@@ -122,7 +122,7 @@ def test_the_plan_keeps_its_proportions_and_shows_all_that_was_flown():
     assert np.all(view[0] <= log.steps.position_m[:, :2].min(axis=0))
     assert np.all(view[1] >= log.steps.position_m[:, :2].max(axis=0))
     assert np.all(view[0] >= world.bounds_m[0, :2])
-    sheet = page.lay_out((20.0, 8.0))
+    sheet = picture_layout.lay_out((20.0, 8.0))
     plan_view.draw(sheet.plan, world, log, view)
     sheet.plan.apply_aspect()
     corners = sheet.plan.transData.transform([[0.0, 0.0], [1.0, 1.0]])
@@ -132,7 +132,7 @@ def test_the_plan_keeps_its_proportions_and_shows_all_that_was_flown():
 class TestSection:
     def cut(self, world, heights_m=(0.7, 1.7), cell_m=0.05):
         visited = np.array([world.start_m])
-        plan = section.cut(world, heights_m, visited, cell_m)
+        plan = cross_section.cut(world, heights_m, visited, cell_m)
 
         def at(x, y):
             return plan.cells[int((x - plan.lower_m[0]) / cell_m), int((y - plan.lower_m[1]) / cell_m)]
@@ -141,20 +141,20 @@ class TestSection:
 
     def test_a_box_is_outlined_its_inside_solid_and_the_rest_open(self):
         plan, at = self.cut(make_world(BOXES))
-        assert at(4.0, 2.0) == section.SURFACE
-        assert at(4.5, 2.0) == section.SOLID
-        assert at(6.0, 6.0) == section.OPEN
-        inner_m2 = np.count_nonzero(plan.cells == section.SOLID) * 0.05**2
+        assert at(4.0, 2.0) == cross_section.SURFACE
+        assert at(4.5, 2.0) == cross_section.SOLID
+        assert at(6.0, 6.0) == cross_section.OPEN
+        inner_m2 = np.count_nonzero(plan.cells == cross_section.SOLID) * 0.05**2
         assert inner_m2 == pytest.approx(8 * 4.0 + 0.4 * 1.2, rel=0.12)
 
     def test_what_stands_below_or_hangs_above_the_slab_is_not_shown(self):
         low, high = ([6.0, 6.0, 0.0], [7.0, 7.0, 0.6]), ([8.0, 6.0, 1.8], [9.0, 7.0, 3.0])
         _, at = self.cut(make_world([low, high, *WALLS]))
-        assert at(6.0, 6.5) == at(6.5, 6.5) == at(8.0, 6.5) == at(8.5, 6.5) == section.OPEN
+        assert at(6.0, 6.5) == at(6.5, 6.5) == at(8.0, 6.5) == at(8.5, 6.5) == cross_section.OPEN
 
     def test_a_table_top_within_the_slab_is_filled(self):
         _, at = self.cut(make_world([([6.0, 6.0, 1.0], [8.0, 7.0, 1.05])]))
-        assert at(7.0, 6.5) == section.SURFACE
+        assert at(7.0, 6.5) == cross_section.SURFACE
 
     def test_a_slanted_triangle_is_cut_at_both_heights(self):
         ramp = make_world([])
@@ -162,7 +162,12 @@ class TestSection:
         triangles = np.array([[0, 1, 2], [1, 3, 2]], dtype=np.int32)
         _, at = self.cut(dataclasses.replace(ramp, vertices_m=vertices, triangles=triangles))
         # the ramp rises 0.25 m per metre from x = 2: inside the slab for 4.8 < x < 8.8
-        expected = {4.6: section.OPEN, 5.0: section.SURFACE, 8.6: section.SURFACE, 9.0: section.OPEN}
+        expected = {
+            4.6: cross_section.OPEN,
+            5.0: cross_section.SURFACE,
+            8.6: cross_section.SURFACE,
+            9.0: cross_section.OPEN,
+        }
         for x, value in expected.items():
             assert at(x, 5.0) == value, x
 

@@ -10,10 +10,11 @@ import pandas as pd
 import pytest
 
 from tests.studies import made_up
-from uavexp.errors import RecordError
-from uavexp.report.figures import drawings_of
-from uavexp.report.make import findings, make_report
-from uavexp.report.parts import Verdict
+from uavexp.errors import ConfigError
+from uavexp.report.contents import Report
+from uavexp.report.declared import declared
+from uavexp.report.judges import Verdict
+from uavexp.report.make import make_report
 from uavexp.store.study import Study
 
 ARMS, SCENES, SEEDS = ("new", "old"), tuple(f"scene {n}" for n in range(8)), range(4)
@@ -22,15 +23,13 @@ CLAIMS = [
         "says": "new is shorter",
         "source": "Table 1",
         "metric": "plan_length_m",
-        "first": "new",
-        "second": "old",
+        "arms": ["new", "old"],
     },
     {
         "says": "new breaks fewer",
         "source": "T 1",
         "metric": "limit_violations",
-        "first": "new",
-        "second": "old",
+        "arms": ["new", "old"],
     },
     {"says": "it fits a small computer", "source": "§5", "why": "no small computer here"},
 ]
@@ -52,30 +51,27 @@ def trials() -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def study_of(folder: Path, **settings: Any) -> Study:
-    given = {"primary": "new", "metrics": ["success", "plan_length_m", "limit_violations"], "claims": CLAIMS}
-    return made_up(
-        folder,
-        trials(),
-        {"arm": ARMS, "scene": SCENES},
-        report="arms",
-        settings=given | settings,
-    )
+def study_of(folder: Path, **changes: Any) -> Study:
+    settings = {"primary": "new", "metrics": ["success", "plan_length_m", "limit_violations"]}
+    report = {"tables": [{"by_metric": {"name": "arms"}}, "paired_tests"], "claims": CLAIMS}
+    figures = [{"metric_panels": {"name": "arms"}}, "convergence", "first_plans"]
+    axes = {"arm": ARMS, "scene": SCENES}
+    return made_up(folder, trials(), axes, report={**report, "figures": figures} | changes, settings=settings)
 
 
 def test_claims_are_judged_by_the_paired_test_of_their_metric(tmp_path: Path) -> None:
-    found = findings(study_of(tmp_path / "study"))
-    assert [claim.verdict for claim in found.claims] == [
+    found = Report(study=study_of(tmp_path / "study"))
+    assert [claim.verdict for claim in found.judgements] == [
         Verdict.REPRODUCED,  # shorter in all of 8 scenes: p = 2 / 2**8
         Verdict.NOT_REPRODUCED,  # none breaks any
         Verdict.NOT_TESTABLE,
     ]
-    assert "-1.00" in found.claims[0].evidence
-    assert found.claims[2].evidence == "no small computer here"
+    assert "-1.00" in found.judgements[0].evidence
+    assert found.judgements[2].evidence == "no small computer here"
 
 
 def test_the_table_has_the_metrics_asked_for_in_their_order(tmp_path: Path) -> None:
-    table = findings(study_of(tmp_path / "study")).tables[0]
+    table = Report(study=study_of(tmp_path / "study")).tables[0]
     assert table.columns == ("", "new", "old")
     assert [row[0].split(",")[0].split(" [")[0] for row in table.rows] == [
         "Trials",
@@ -87,7 +83,7 @@ def test_the_table_has_the_metrics_asked_for_in_their_order(tmp_path: Path) -> N
 
 
 def test_cost_falls_over_iterations_and_over_time(tmp_path: Path) -> None:
-    drawings = {drawing.name: drawing for drawing in drawings_of(study_of(tmp_path / "study"))}
+    drawings = {drawing.name: drawing for drawing in Report(study=study_of(tmp_path / "study")).drawings()}
     assert set(drawings) == {"arms", "convergence"}
     by_iteration, by_time = drawings["convergence"].figure.axes[:2]
     curve, timed = by_iteration.lines[0], by_time.lines[0]
@@ -102,22 +98,61 @@ def test_a_claim_about_an_arm_that_was_not_flown_is_not_testable(tmp_path: Path)
         tmp_path / "study",
         trials().query("arm == 'old'"),
         {"arm": ("old",), "scene": SCENES},
-        report="arms",
-        settings={"primary": "new", "metrics": ["plan_length_m"], "claims": CLAIMS},
+        report={"claims": CLAIMS},
+        settings={"primary": "new", "metrics": ["plan_length_m"]},
     )
-    assert {claim.verdict for claim in findings(part).claims} == {Verdict.NOT_TESTABLE}
+    assert {claim.verdict for claim in Report(study=part).judgements} == {Verdict.NOT_TESTABLE}
 
 
 @pytest.mark.parametrize(
-    ("settings", "says"),
+    ("changes", "says"),
     [
-        ({"metrics": ["plan_lenght_m"]}, "plan_lenght_m unknown"),
-        ({"claims": [{"says": "no source"}]}, "settings.claims"),
+        ({"tables": ["by_metrc"]}, r"no such one: by_metrc \(did you mean 'by_metric'\?\); there are by_arm"),
+        ({"tables": [{"by_metric": {"metrics": ["plan_lenght_m"]}}]}, "did you mean 'plan_length_m'"),
+        ({"tables": [{"by_arm": {"fornt": True}}]}, "no option fornt.*did you mean 'front'"),
+        ({"tables": ["levels"]}, "levels: needs arm, undisturbed"),
+        ({"figures": ["os.path"]}, "os.path is refused"),
+        ({"figures": ["uavexp.report.style"]}, "has no function figure"),
+        ({"figures": [{"success": {}, "contacts": {}}]}, "each is NAME"),
+        ({"claims": [{"says": "no source"}]}, "each needs says, source"),
+        ({"claims": [{"says": "x", "source": "y", "judge": "worse"}]}, "no such judge: worse"),
+        ({"claims": [{"says": "x", "source": "y", "metric": "success"}]}, "needs arms"),
     ],
 )
-def test_settings_that_cannot_be_read_are_named(tmp_path: Path, settings: dict[str, Any], says: str) -> None:
-    with pytest.raises(RecordError, match=says):
-        findings(study_of(tmp_path / "study", **settings))
+def test_what_does_not_exist_is_named_with_what_does(
+    tmp_path: Path, changes: dict[str, Any], says: str
+) -> None:
+    with pytest.raises(ConfigError, match=says):
+        declared(study_of(tmp_path / "study", **changes))
+
+
+def test_a_table_and_a_figure_may_stay_in_ones_own_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "__init__.py").write_text("")
+    (tmp_path / "mine" / "widths.py").write_text(OWN)
+    monkeypatch.syspath_prepend(tmp_path)
+    study = study_of(tmp_path / "study", tables=[{"mine.widths": {"of": "arms"}}], figures=["mine.widths"])
+    with pytest.raises(ConfigError, match="UAVEXP_TRUST"):
+        declared(study)
+    monkeypatch.setenv("UAVEXP_TRUST", "mine")
+    (table,) = Report(study=study).tables
+    (drawing,) = Report(study=study).drawings()
+    assert (table.name, table.rows) == ("widths", (("2 arms",),))
+    assert drawing.name == "widths"
+
+
+OWN = """
+from uavexp.report.figures.base import Drawing, new_figure
+from uavexp.report.tables.base import Table
+
+def table(results, *, name, of):
+    return Table(name=name, title="Widths", columns=("n",), rows=((f"{len(results.arms)} {of}",),))
+
+def figure(results, *, name):
+    return Drawing(name=name, caption=results.notes[0], figure=new_figure(3.5, 2.0))
+"""
 
 
 def test_the_whole_report_is_written(tmp_path: Path) -> None:

@@ -10,13 +10,17 @@ import pandas as pd
 import pytest
 from matplotlib.text import Text
 
-from tests.studies import copy_of, flown, made_up  # noqa: F401
+from tests.studies import copy_of, flown, made_up, shipped  # noqa: F401
 from uavexp.metrics import replanning
-from uavexp.report import style
-from uavexp.report.figures import canvas, drawings_of, robustness, safety, tradeoff
-from uavexp.report.figures import flown as shown_flights
-from uavexp.report.figures.canvas import png_of
-from uavexp.report.findings import study_panel
+from uavexp.report import flights as shown_flights
+from uavexp.report import replan_marks, style
+from uavexp.report.contents import Report
+from uavexp.report.figures import base
+from uavexp.report.figures.base import png_of
+from uavexp.report.figures.minimum_clearance import crowding
+from uavexp.report.figures.trade_off import curves_of
+from uavexp.report.labels import FALSE_TRIGGERS
+from uavexp.report.results import ARM, Results
 from uavexp.store.study import LOG, TRIALS, WORLDS
 
 WITH_LOGS = {"figure_3", "figure_4", "figure_5", "figure_8"}
@@ -25,7 +29,7 @@ TEXT_PT = 7.0  # the least that is read in print
 
 @pytest.fixture(scope="module")
 def drawings(flown):  # noqa: F811
-    return {drawing.name: drawing for drawing in drawings_of(flown)}
+    return {drawing.name: drawing for drawing in Report(study=flown).drawings()}
 
 
 def rows_of(arms, scenes, seeds, **columns):
@@ -43,14 +47,14 @@ class TestWhatIsDrawn:
     def test_without_logs_the_figures_of_single_flights_are_left_out(self, flown, tmp_path):  # noqa: F811
         study = copy_of(flown, tmp_path / "bare")
         shutil.rmtree(study.folder / TRIALS)
-        names = {drawing.name for drawing in drawings_of(study)}
+        names = {drawing.name for drawing in Report(study=study).drawings()}
         assert names >= {"figure_6", "figure_7", "figure_9", "success"}
         assert not names & {*WITH_LOGS, "figure_10"}
 
     def test_without_worlds_too(self, flown, tmp_path):  # noqa: F811
         study = copy_of(flown, tmp_path / "bare")
         shutil.rmtree(study.folder / WORLDS)
-        assert not {drawing.name for drawing in drawings_of(study)} & {*WITH_LOGS, "figure_10"}
+        assert not {drawing.name for drawing in Report(study=study).drawings()} & {*WITH_LOGS, "figure_10"}
 
     def test_every_caption_tells_n_and_seeds(self, drawings):
         for drawing in drawings.values():
@@ -59,16 +63,16 @@ class TestWhatIsDrawn:
 
     def test_the_same_study_gives_the_same_bytes_and_leaves_the_users_style_alone(self, flown):  # noqa: F811
         with mpl.rc_context({"font.size": 23.0}):
-            again = {drawing.name: drawing for drawing in drawings_of(flown)}
+            again = {drawing.name: drawing for drawing in Report(study=flown).drawings()}
             assert mpl.rcParams["font.size"] == 23.0
         with style.house_style():
-            once = {drawing.name: png_of(drawing.figure) for drawing in drawings_of(flown)}
+            once = {drawing.name: png_of(drawing.figure) for drawing in Report(study=flown).drawings()}
             for name, drawing in again.items():
                 assert png_of(drawing.figure) == once[name], name
 
     def test_text_is_legible_in_print_and_the_width_a_papers(self, drawings):
         for name, drawing in drawings.items():
-            assert drawing.figure.get_figwidth() in (canvas.COLUMN_IN, canvas.PAGE_IN), name
+            assert drawing.figure.get_figwidth() in (base.COLUMN_IN, base.PAGE_IN), name
             for text in drawing.figure.findobj(Text):
                 assert not text.get_text() or text.get_fontsize() >= TEXT_PT, (name, text.get_text())
 
@@ -76,28 +80,28 @@ class TestWhatIsDrawn:
 class TestWhichFlights:
     def test_the_world_shown_is_the_lowest_seed_flown_by_every_arm(self, flown, tmp_path):  # noqa: F811
         study = copy_of(flown, tmp_path / "holes")
-        flights = shown_flights.flights_of(study)
-        arms, scenes = shown_flights.three_arms(study), shown_flights.scenes_of(study, flights)
+        flights, arms = Results(study=study).trials, shown_flights.three_arms(Results(study=study))
 
         def first():
-            there = shown_flights.stored(study, flights)
-            return next(shown_flights.shared_worlds(study, there, arms, scenes[:1]))
+            results = Results(study=study)
+            return next(shown_flights.shared_worlds(results, arms, results.scenes[:1]))
 
         seeds = sorted(flights["seed"].unique())
         assert first().seed == seeds[0]
         assert tuple(first().logs) == arms
-        gone = flights[(flights["seed"] == seeds[0]) & (flights[shown_flights.ARM] == arms[-1])]
+        gone = flights[(flights["seed"] == seeds[0]) & (flights[ARM] == arms[-1])]
         for trial in gone["trial"]:
             (study.folder / TRIALS / trial / LOG).unlink()
         assert first().seed == seeds[1]
 
     def test_the_three_strategies_are_the_papers_whatever_else_was_flown(self, tmp_path):
         arms = ("other", "MCR", "SSP", "TBR frequent", "TBR")
-        study = made_up(tmp_path, rows_of(arms, ("a",), 1, success=True), {"arm": arms, "scene": ("a",)})
-        assert shown_flights.three_arms(study) == ("SSP", "TBR", "MCR")
+        rows, axes = rows_of(arms, ("a",), 1, success=True), {"arm": arms, "scene": ("a",)}
+        study = made_up(tmp_path, rows, axes, settings={"primary": "MCR"})
+        assert shown_flights.three_arms(Results(study=study)) == ("SSP", "TBR", "MCR")
 
     def test_replans_of_the_table_are_those_of_the_logs(self, flown):  # noqa: F811
-        flights = shown_flights.flights_of(flown)
+        flights = Results(study=flown).trials
         counted = shown_flights.executed(flown.replans, flights)["trial"].value_counts()
         for row in flights.to_dict("records"):
             log = replanning.executed(flown.log(row["trial"]))
@@ -106,10 +110,9 @@ class TestWhichFlights:
 
 class TestPaths:
     def test_figure_3_draws_the_flown_paths_to_scale(self, flown, drawings):  # noqa: F811
-        flights = shown_flights.flights_of(flown)
-        arms, scenes = shown_flights.three_arms(flown), shown_flights.scenes_of(flown, flights)
-        there = shown_flights.stored(flown, flights)
-        shared = next(shown_flights.shared_worlds(flown, there, arms, scenes[:1]))
+        results = Results(study=flown)
+        arms = shown_flights.three_arms(results)
+        shared = next(shown_flights.shared_worlds(results, arms, results.scenes[:1]))
         axes = drawings["figure_3"].figure.axes[0]
         drawn = [line.get_xydata() for line in axes.lines if len(line.get_xydata()) > 100]
         for log in shared.logs.values():
@@ -118,10 +121,9 @@ class TestPaths:
         assert axes.get_aspect() == 1.0
 
     def test_figure_9_has_a_marker_for_every_replan_of_the_scene(self, flown, drawings):  # noqa: F811
-        flights = shown_flights.flights_of(flown)
-        scene = shown_flights.scenes_of(flown, flights)[0]
+        flights, scene = Results(study=flown).trials, Results(study=flown).scenes[0]
         expected = shown_flights.executed(flown.replans, flights[flights["scene"] == scene])
-        causes = {style.cause_mark(cause).colour for cause in expected["cause"]}
+        causes = {replan_marks.cause_mark(cause).colour for cause in expected["cause"]}
         lines = [line for axes in drawings["figure_9"].figure.axes for line in axes.lines]
         drawn = sum(
             len(line.get_xdata())
@@ -144,8 +146,10 @@ class TestPaths:
         ]
         late = {"trial": "t0", "number": 3, "cause": "goal", **event, "effective_s": 9.5}  # after the end
         axes = {"arm": ("MCR",), "scene": ("a",)}
-        study = made_up(tmp_path, table, axes, report="table1", replans=pd.DataFrame([*replans, late]))
-        drawing = next(drawing for drawing in drawings_of(study) if drawing.name == "figure_9")
+        study = made_up(
+            tmp_path, table, axes, report=shipped("mcr/table1"), replans=pd.DataFrame([*replans, late])
+        )
+        drawing = next(drawing for drawing in Report(study=study).drawings() if drawing.name == "figure_9")
         (legend,) = drawing.figure.legends
         words = [text.get_text() for text in legend.get_texts()]
         assert words == ["map", "retry", "end: success", "end: failure"]
@@ -158,10 +162,10 @@ class TestSafety:
         table = rows_of(
             ("MCR",), ("a",), n, success=True, min_clearance_m=clearance_m, collision_count=contacts
         )
-        return made_up(tmp_path, table, {"arm": ("MCR",), "scene": ("a",)}, report="table1")
+        return made_up(tmp_path, table, {"arm": ("MCR",), "scene": ("a",)}, report=shipped("mcr/table1"))
 
     def drawing(self, study, name):
-        return next(drawing for drawing in drawings_of(study) if drawing.name == name)
+        return next(drawing for drawing in Report(study=study).drawings() if drawing.name == name)
 
     def test_every_flight_is_a_point_at_its_clearance(self, tmp_path):
         clearance_m = np.random.default_rng(0).gamma(9.0, 0.05, 200)
@@ -188,7 +192,7 @@ class TestSafety:
 
     @pytest.mark.parametrize("values", [[], [0.3], [0.3, 0.3, 0.3], [0.1, 0.2]])
     def test_a_cloud_of_any_size_stays_in_its_column(self, values):
-        places = safety.crowding(np.array(values))
+        places = crowding(np.array(values))
         assert places.shape == (len(values),)
         assert np.all(np.abs(places) <= 1.0)
 
@@ -211,19 +215,18 @@ class TestTradeoff:
             parts.append(part.assign(setting=setting, p_trigger_interval_s=interval_s, replans=replans))
         table = pd.concat(parts, ignore_index=True)
         table["trial"] = [f"t{number}" for number in range(len(table))]
-        return made_up(tmp_path, table, axes, report="tradeoff")
+        return made_up(tmp_path, table, axes, report=shipped("mcr/thresholds"))
 
     def test_a_curve_per_policy_joined_along_its_parameter(self, tmp_path):
         study = self.study(tmp_path)
-        panel = study_panel(study, tradeoff_metrics())
-        curves = tradeoff.curves_of(study, shown_flights.flights_of(study), panel)
+        curves = curves_of(Results(study=study))
         assert [(curve.name, curve.labels, curve.parameter) for curve in curves] == [
             ("TBR", ("1", "2"), "interval_s"),
             ("MCR", ("",), ""),
         ]
 
     def test_points_stand_at_the_means(self, tmp_path):
-        drawing = next(iter(drawings_of(self.study(tmp_path))))
+        drawing = next(iter(Report(study=self.study(tmp_path)).drawings()))
         left, right = drawing.figure.axes
         by_name = {line.get_label(): line for line in right.lines}
         np.testing.assert_allclose(by_name["TBR"].get_xydata(), [[12.0, 1.2], [7.0, 0.7]])
@@ -237,16 +240,9 @@ class TestTradeoff:
         table["trigger"] = "mcr"
         table["p_trigger_judge"] = np.where(table["arm"] == "MCR", "path", "region")
         table["p_trigger_since"] = np.where(table["arm"] == "MCR", "plan", "update")
-        study = made_up(tmp_path, table, {"arm": arms, "scene": ("a", "b")}, report="tradeoff")
-        panel = study_panel(study, tradeoff_metrics())
-        curves = tradeoff.curves_of(study, shown_flights.flights_of(study), panel)
+        study = made_up(tmp_path, table, {"arm": arms, "scene": ("a", "b")}, report=shipped("mcr/thresholds"))
+        curves = curves_of(Results(study=study))
         assert [curve.arms for curve in curves] == [("MCR",), ("MCR literal",)]
-
-
-def tradeoff_metrics():
-    from uavexp.report import shown
-
-    return (shown.RATE, shown.CLEARANCE, shown.REPLANS)
 
 
 def test_policies_show_the_shares_of_causes_and_of_useful_replans(tmp_path):
@@ -261,8 +257,8 @@ def test_policies_show_the_shares_of_causes_and_of_useful_replans(tmp_path):
         useful_replans=np.where(ours, 6.0, 4.0),
         blocked_delay_s=np.where(ours, 0.1, np.nan),
     )
-    study = made_up(tmp_path, table, {"arm": arms, "scene": ("a", "b")}, report="policies")
-    drawing = {item.name: item for item in drawings_of(study)}["policies_replans"]
+    study = made_up(tmp_path, table, {"arm": arms, "scene": ("a", "b")}, report=shipped("mcr/policies"))
+    drawing = {item.name: item for item in Report(study=study).drawings()}["policies_replans"]
     often, causes, worth, delay = drawing.figure.axes
     assert [bar.get_width() for bar in causes.patches] == pytest.approx([25, 0, 75, 0, 0, 100])
     assert [bar.get_width() for bar in worth.patches] == pytest.approx([75, 40, 25, 60])
@@ -290,21 +286,22 @@ def test_robustness_draws_every_level_at_its_mean(tmp_path):
         ]
     )
     axes = {"arm": ("MCR",), "noise": ("none", "strong"), "latency": ("0 ms", "30 ms"), "scene": ("a", "b")}
-    study = made_up(tmp_path, table, axes, report="robustness", replans=replans)
-    (drawing,) = drawings_of(study)
+    report = {"figures": [{"disturbances": {"arm": "MCR"}}]}
+    study = made_up(tmp_path, table, axes, report=report, replans=replans)
+    (drawing,) = Report(study=study).drawings()
     success, clearance, false = drawing.figure.axes
     for panel, expected in ((success, [100.0, 0.0]), (clearance, [0.4, 0.4]), (false, [0.0, 2.0])):
         drawn = [line for line in panel.lines if line.get_label() in axes["latency"]]
         assert len(drawn) == 2
         for line in drawn:
             np.testing.assert_allclose(line.get_ydata(), expected)
-    assert robustness.METRICS[2].label == false.get_ylabel().replace("\n", " ")
+    assert FALSE_TRIGGERS.label == false.get_ylabel().replace("\n", " ")
 
 
 def test_a_summary_has_a_row_per_arm(tmp_path):
     arms = tuple(f"arm {number}" for number in range(9))
     study = made_up(tmp_path, rows_of(arms, ("a",), 4, success=True), {"arm": arms, "scene": ("a",)})
-    (drawing,) = drawings_of(study)
+    (drawing,) = Report(study=study).drawings()
     assert drawing.name == "success"
     assert len(drawing.figure.axes[0].get_yticklabels()) == 9
 
@@ -313,4 +310,4 @@ def test_a_summary_has_a_row_per_arm(tmp_path):
     ("numbers", "words"), [([3], "3"), ([0, 1, 2, 3], "0 to 3"), ([0, 2, 5], "0, 2, 5"), ([4, 5], "4, 5")]
 )
 def test_seeds_in_words(numbers, words):
-    assert canvas.span(numbers) == words
+    assert base.span(numbers) == words

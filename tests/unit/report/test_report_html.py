@@ -16,14 +16,15 @@ import pytest
 from tests.studies import copy_of, flown, made_up  # noqa: F401
 from uavexp.metrics import replanning
 from uavexp.report import flight3d, html
-from uavexp.report.figures import drawings_of
-from uavexp.report.figures.canvas import png_of
-from uavexp.report.parts import Claim, Table, Verdict
+from uavexp.report.contents import Judgement, Report
+from uavexp.report.figures.base import png_of
+from uavexp.report.judges import Verdict
+from uavexp.report.tables.base import Table
 from uavexp.store.study import TRIALS, read_wall
 
 TABLE = Table(name="t", title="A <table>", columns=("", "x & y"), rows=(("one", "1 < 2"),), notes=("n = 1",))
 CLAIMS = tuple(
-    Claim(statement=f"it is {verdict}", source="§4", verdict=verdict, evidence='"5 > 4"')
+    Judgement(statement=f"it is {verdict}", source="§4", verdict=verdict, evidence='"5 > 4"')
     for verdict in Verdict
 )
 VOID = {"meta", "img", "input", "br", "link"}
@@ -63,9 +64,10 @@ class Page(HTMLParser):
         return [attributes for name, attributes in self.tags if name == tag]
 
 
-def written(study, drawings=(), tables=(TABLE,), claims=CLAIMS) -> str:
-    path = study.folder / "report.html"
-    html.write_html(study, tables, claims, drawings, path)
+def written(study, drawings=()) -> str:
+    path, report = study.folder / "report.html", Report(study=study)
+    report.__dict__.update(tables=(TABLE,), judgements=CLAIMS)  # in place of those of the study
+    html.write_html(report, drawings, path)
     return path.read_text(encoding="utf-8")
 
 
@@ -73,7 +75,7 @@ def written(study, drawings=(), tables=(TABLE,), claims=CLAIMS) -> str:
 def drawn(flown, tmp_path_factory):  # noqa: F811
     folder = tmp_path_factory.mktemp("figures")
     pairs = []
-    for drawing in drawings_of(flown):
+    for drawing in Report(study=flown).drawings():
         path = folder / f"{drawing.name}.png"
         path.write_bytes(png_of(drawing.figure, dpi=40))
         pairs.append((drawing, path))

@@ -11,7 +11,7 @@ import pytest
 from tests.logs import make_log, make_world, still_curve
 from tests.studies import made_up
 from uavexp.log import TrialLog
-from uavexp.report.figures import drawings_of
+from uavexp.report.contents import Report
 from uavexp.store.logs import log_arrays, write_log
 from uavexp.store.records import LOG
 from uavexp.store.study import TRIALS, WORLDS, Study
@@ -51,8 +51,14 @@ def study_of(folder: Path, kinds: tuple[str, str] = ARMS) -> Study:
         }
         for arm, kind, share in zip(ARMS, kinds, (1.0, 0.5), strict=True)
     ]
+    figures = [
+        {"metric_panels": {"name": "arms"}},
+        {"inspected_plans": {"name": "plans"}},
+        "coverage_over_time",
+    ]
+    report = {"figures": figures}
     settings = {"primary": "static", "metrics": ["coverage_visible"]}
-    study = made_up(folder, pd.DataFrame(rows), {"arm": ARMS}, report="arms", settings=settings)
+    study = made_up(folder, pd.DataFrame(rows), {"arm": ARMS}, report=report, settings=settings)
     (folder / WORLDS).mkdir()
     write_world(folder / WORLDS / "w.npz", make_world([([3.0, 3.0, 0.0], [4.0, 4.0, 2.0])]))
     for arm, share in zip(ARMS, (1.0, 0.5), strict=True):
@@ -62,7 +68,7 @@ def study_of(folder: Path, kinds: tuple[str, str] = ARMS) -> Study:
 
 
 def test_coverage_rises_to_each_arms_share(tmp_path: Path) -> None:
-    drawings = {drawing.name: drawing for drawing in drawings_of(study_of(tmp_path / "study"))}
+    drawings = {drawing.name: drawing for drawing in Report(study=study_of(tmp_path / "study")).drawings()}
     assert set(drawings) == {"arms", "plans", "coverage_over_time"}
     curves = drawings["coverage_over_time"].figure.axes[0].lines
     assert [curve.get_label() for curve in curves] == ["static (1)", "both (1)"]
@@ -74,12 +80,12 @@ def test_coverage_rises_to_each_arms_share(tmp_path: Path) -> None:
 
 
 def test_the_plans_are_of_the_first_and_the_last_arm(tmp_path: Path) -> None:
-    drawings = {drawing.name: drawing for drawing in drawings_of(study_of(tmp_path / "study"))}
+    drawings = {drawing.name: drawing for drawing in Report(study=study_of(tmp_path / "study")).drawings()}
     titles = [axes.get_title() for axes in drawings["plans"].figure.axes]
     assert [title.split(":")[0] for title in titles] == ["static, seed 3", "both, seed 3"]
     assert ["100.00 %" in titles[0], "50.00 %" in titles[1]] == [True, True]
 
 
 def test_a_study_without_inspections_has_neither(tmp_path: Path) -> None:
-    names = {drawing.name for drawing in drawings_of(study_of(tmp_path / "study", ("", "")))}
+    names = {drawing.name for drawing in Report(study=study_of(tmp_path / "study", ("", ""))).drawings()}
     assert names == {"arms"}

@@ -14,7 +14,7 @@ import pyarrow as pa
 import pytest
 from pyarrow import parquet
 
-from tests.studies import copy_of, flown  # noqa: F401
+from tests.studies import copy_of, flown, shipped  # noqa: F401
 from tests.unit.report.test_report_tables import BAD, GOOD, WORST, trials_of
 from uavexp.errors import RecordError
 from uavexp.report import make
@@ -32,7 +32,7 @@ def write_study(folder: Path, **changes: object) -> Path:
     text = {
         "name": "mcr/table1",
         "title": "Made-up",
-        "report": "table1",
+        "report": shipped("mcr/table1"),
         "axes": [[axis, list(trials[axis].drop_duplicates())] for axis in ("arm", "scene")],
         "seeds": [0, 1],
         "settings": {"primary": "MCR", "time_based": "TBR"},
@@ -93,6 +93,7 @@ def test_same_trials_same_bytes(reported: tuple[Path, list[Path]], tmp_path: Pat
     [
         (lambda folder: (folder / "study.json").unlink(), "holds no study"),
         (lambda folder: (folder / "study.json").write_text("{"), "damaged"),
+        (lambda folder: write_study(folder, report="table1"), "damaged"),  # of an earlier version
         (lambda folder: (folder / TABLE).unlink(), "cannot be read"),
         (lambda folder: (folder / TABLE).write_bytes(b"PAR1 nonsense"), "cannot be read"),
     ],
@@ -132,7 +133,7 @@ def test_files_of_an_earlier_report_go_and_no_others(tmp_path: Path) -> None:
         file.write_text("mine")
     with (folder / make.MANIFEST).open("a") as manifest:
         manifest.write("mine.txt\n../../outside\ntrials.parquet\n")  # not a report's to remove
-    write_study(folder, report="")
+    write_study(folder, report={})
     after = {str(file.relative_to(folder)) for file in make.make_report(folder)}
     assert {"tables/table1.csv", "claims.md", "figures/figure_6.pdf"} <= before - after
     assert not any((folder / name).exists() for name in before - after)

@@ -324,7 +324,7 @@ def test_a_delay_that_a_record_does_not_tell_comes_from_its_log(tmp_path: Path) 
     trial.mkdir(parents=True)
     (trial / "record.json").write_text(seal(cell))
     study = Study(
-        folder=tmp_path, name="", title="", report="", axes={"cell": ("mcr",)}, seeds=(3,), settings={},
+        folder=tmp_path, name="", title="", report={}, axes={"cell": ("mcr",)}, seeds=(3,), settings={},
         cells=(StudyCell(digest=cell_digest(cell), labels={"cell": "mcr"}),),
     )  # fmt: skip
     (tmp_path / "study.json").write_text(study_text(study))

@@ -9,13 +9,15 @@ import numpy as np
 from matplotlib.lines import Line2D
 
 from uavexp.arrays import Float
+from uavexp.errors import RecordError
 from uavexp.log import Replan, TrialLog
 from uavexp.metrics import replanning
-from uavexp.report import plan_view, style
-from uavexp.report.figures import canvas
-from uavexp.report.figures.flown import SharedWorld
-from uavexp.report.figures.over_time import draw_replans
-from uavexp.report.parts import Drawing
+from uavexp.report import plan_view, replan_marks, style
+from uavexp.report.figures import base
+from uavexp.report.figures.base import Drawing
+from uavexp.report.flights import SharedWorld, shared_worlds
+from uavexp.report.replan_marks import draw_replans
+from uavexp.report.results import Results
 from uavexp.types import World
 
 if TYPE_CHECKING:
@@ -31,14 +33,26 @@ def is_fired_by_map(log: TrialLog) -> bool:
     return any(len(replan.changed_m) for replan in replanning.executed(log))
 
 
-def attribution(arm: str, shared: SharedWorld) -> Drawing:
-    """Draw a close-up of each of a flight's first replans, and the event's score over time."""
+def figure(results: Results, *, name: str) -> Drawing:
+    """Draw a close-up of each of a flight's first replans, and the event's score over time.
+
+    Raises:
+        RecordError: no stored flight of the primary arm has a replan fired by a change of the map.
+    """
+    arm = results.primary
+    for shared in shared_worlds(results, [arm], results.scenes or ("",)):
+        if is_fired_by_map(shared.logs[arm]):
+            return _draw(name, arm, shared)
+    raise RecordError(f"no stored flight of {arm} has a replan fired by a change of the map")
+
+
+def _draw(name: str, arm: str, shared: SharedWorld) -> Drawing:
     log = shared.logs[arm]
     shown = replanning.executed(log)[: _COLUMNS * _ROWS]
     rows = -(-len(shown) // _COLUMNS)
-    figure = canvas.new_figure(canvas.PAGE_IN, 2.0 + 2.55 * rows)
+    drawn = base.new_figure(base.PAGE_IN, 2.0 + 2.55 * rows)
     names = [[f"{row} {column}" for column in range(_COLUMNS)] for row in range(rows)]
-    parts: dict[str, Axes] = figure.subplot_mosaic(
+    parts: dict[str, Axes] = drawn.subplot_mosaic(
         [*names, ["score"] * _COLUMNS], height_ratios=[2.5] * rows + [1.0]
     )
     score = parts.pop("score")
@@ -48,8 +62,8 @@ def attribution(arm: str, shared: SharedWorld) -> Drawing:
         axes.set_axis_on()
         _draw_close_up(axes, shared.world, log, replan, _letter(number))
     _draw_score(score, log, shown)
-    figure.legend(handles=_key(), loc="outside upper center", ncols=7, fontsize=7, columnspacing=1.0)
-    return Drawing(name="figure_10", caption=_caption(arm, shared, len(shown)), figure=figure)
+    drawn.legend(handles=_key(), loc="outside upper center", ncols=7, fontsize=7, columnspacing=1.0)
+    return Drawing(name=name, caption=_caption(arm, shared, len(shown)), figure=drawn)
 
 
 def _draw_close_up(axes: Axes, world: World, log: TrialLog, replan: Replan, letter: str) -> None:
@@ -62,11 +76,11 @@ def _draw_close_up(axes: Axes, world: World, log: TrialLog, replan: Replan, lett
     axes.plot(new_m[:, 0], new_m[:, 1], color=style.BLUE, lw=2.2, zorder=4.5)
     axes.plot(old_m[:, 0], old_m[:, 1], color=style.VERMILLION, lw=1.5, ls=(0, (3, 1.5)), zorder=5)
     axes.plot(*replan.goal_m[:2], "o", mfc="white", mec=style.BLUE, mew=1.3, ms=5, zorder=6)
-    axes.plot(*replan.position_m[:2], zorder=7, **style.marker(replan.cause, 8.0))
+    axes.plot(*replan.position_m[:2], zorder=7, **replan_marks.marker(replan.cause, 8.0))
     centre_m = _centre_m(replan)
     plan_view.frame(axes, np.stack([centre_m - _REACH_M, centre_m + _REACH_M]))
     axes.set(xlabel="", ylabel="")
-    what = f", {canvas.count(len(changed_m), 'voxel')}" if len(changed_m) else ""
+    what = f", {base.count(len(changed_m), 'voxel')}" if len(changed_m) else ""
     title = f"{letter}: {replan.cause}{what}, {replan.time_s:.1f} s\n{_departure(replan)}"
     axes.set_title(title, fontsize=7.5, loc="left")
 
@@ -107,7 +121,7 @@ def _draw_score(axes: Axes, log: TrialLog, shown: Sequence[Replan]) -> None:
         )
     axes.set(xlabel="time [s]", ylabel="event over\nthreshold", xlim=(0.0, float(log.steps.time_s[-1])))
     axes.set_ylim(0.0, _MOST_SCORE)
-    canvas.tidy(axes)
+    base.tidy(axes)
 
 
 def _letter(number: int) -> str:
@@ -121,8 +135,8 @@ def _key() -> list[Line2D]:
         Line2D([], [], color=style.VERMILLION, lw=1.5, ls=(0, (3, 1.5)), label="old plan"),
         Line2D([], [], color=style.BLUE, lw=2.2, label="new plan"),
         Line2D([], [], color="white", marker="o", ls="", mec=style.BLUE, mew=1.3, ms=5, label="new goal"),
-        Line2D([], [], label="map event", **style.marker("map", 6.0)),
-        Line2D([], [], label="goal event", **style.marker("goal", 6.0)),
+        Line2D([], [], label="map event", **replan_marks.marker("map", 6.0)),
+        Line2D([], [], label="goal event", **replan_marks.marker("goal", 6.0)),
     ]
 
 

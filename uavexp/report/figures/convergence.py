@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
 from uavexp.arrays import Float
-from uavexp.report.comparison import arm_names
-from uavexp.report.figures import canvas
-from uavexp.report.figures.looks import Look
-from uavexp.report.findings import arm_axes
-from uavexp.report.parts import Drawing
-from uavexp.store.study import Study
+from uavexp.report.comparison import SCENE
+from uavexp.report.figures import base
+from uavexp.report.figures.base import Drawing
+from uavexp.report.looks import Look, looks_of
+from uavexp.report.results import ARM, Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,26 +22,27 @@ _SAME = 0.25  # a cost that differs more from the path's length is no length
 _SEARCH, _ITERATIONS = "wall_search_sum_s", "plan_iterations"
 
 
-def convergence(study: Study, arms: tuple[str, ...], looks: Mapping[str, Look], note: str) -> Drawing | None:
+def figure(results: Results, *, name: str) -> Drawing | None:
     """Draw median and quartiles of cost over the least cost found by any arm, over iterations and time.
 
     Arms are compared with those of the same unit only: the cost of some is a length, of others a time.
     None where the trials have no history of cost.
     """
-    names = [str(name) for name in study.trials.columns if str(name).startswith(COST)]
-    columns = sorted(names, key=lambda name: int(name[len(COST) :]))
+    histories = [str(column) for column in results.trials.columns if str(column).startswith(COST)]
+    columns = sorted(histories, key=lambda column: int(column[len(COST) :]))
     if not columns:
         return None
-    trials = study.trials.assign(_arm=arm_names(study.trials, tuple(arm_axes(study))))
-    is_length = {arm: _is_length(trials[trials["_arm"] == arm], columns) for arm in arms}
-    trials["_is_length"] = trials["_arm"].map(is_length)
-    within = [*_world(trials), "_is_length"]
+    looks = looks_of(results, results.arms)
+    trials = results.trials
+    is_length = {arm: _is_length(trials[trials[ARM] == arm], columns) for arm in results.arms}
+    trials = trials.assign(_is_length=trials[ARM].map(is_length))
+    within = [SCENE, "seed", "_is_length"]
     trials = trials.join(trials.groupby(within)[columns].min().min(axis=1).rename("_best"), on=within)
-    figure = canvas.new_figure(canvas.PAGE_IN, 2.9)
-    by_iteration, by_time = figure.subplots(1, 2, sharey=True)
+    drawn = base.new_figure(base.PAGE_IN, 2.9)
+    by_iteration, by_time = drawn.subplots(1, 2, sharey=True)
     iterations = np.array([float(column[len(COST) :]) for column in columns])
-    for arm in arms:
-        flown = trials[trials["_arm"] == arm]
+    for arm in results.arms:
+        flown = trials[trials[ARM] == arm]
         share = flown[columns].to_numpy(dtype=float) / flown["_best"].to_numpy(dtype=float)[:, None]
         share[:, iterations > _longest(flown)] = np.nan
         if not np.isfinite(share).any():
@@ -56,9 +55,9 @@ def convergence(study: Study, arms: tuple[str, ...], looks: Mapping[str, Look], 
     for axes, label in ((by_iteration, "iterations"), (by_time, "search time [ms]")):
         axes.set(xscale="log", xlabel=label)
     by_iteration.set_ylabel("cost over the least found")
-    canvas.tidy(by_iteration, by_time)
-    figure.legend(loc="outside upper center", ncols=4, fontsize=7.5)
-    return Drawing(name="convergence", caption=f"{_CAPTION} {note}", figure=figure)
+    base.tidy(by_iteration, by_time)
+    drawn.legend(loc="outside upper center", ncols=4, fontsize=7.5)
+    return Drawing(name=name, caption=f"{_CAPTION} {results.notes[0]}", figure=drawn)
 
 
 _CAPTION = (
@@ -80,10 +79,6 @@ def _is_length(flown: pd.DataFrame, columns: list[str]) -> bool:
 def _longest(flown: pd.DataFrame) -> float:
     """Iterations of the longest search; inf when they were not counted."""
     return float(flown[_ITERATIONS].max()) if _ITERATIONS in flown else float("inf")
-
-
-def _world(trials: pd.DataFrame) -> list[str]:
-    return [name for name in ("scene", "seed") if name in trials]
 
 
 def _seconds_per_iteration(flown: pd.DataFrame) -> float:

@@ -7,50 +7,55 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from uavexp.report import shown
 from uavexp.report.comparison import Panel, estimate
-from uavexp.report.figures import canvas
-from uavexp.report.figures.looks import Look
-from uavexp.report.parts import Drawing
+from uavexp.report.figures import base
+from uavexp.report.figures.base import Drawing
+from uavexp.report.labels import RATE
+from uavexp.report.looks import Look, looks_of
+from uavexp.report.results import Results
 from uavexp.report.statistics import Interval, wilson_interval
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _MOST_ARMS = 6  # told apart within a scene
 _SPREAD = 0.62  # of a row's height taken by its arms
 
 
-def success_rates(panel: Panel, looks: Mapping[str, Look], note: str, scenes: Sequence[str] = ()) -> Drawing:
-    """Draw success rates with their intervals: by scene (in the order given) and arm, or a row per arm."""
-    by_scene = len(panel.scenes) > 1 and 1 < len(panel.arms) <= _MOST_ARMS
-    return _by_scene(panel, looks, note, scenes) if by_scene else _by_arm(panel, looks, note)
+def figure(results: Results, *, name: str) -> Drawing:
+    """Draw success rates with their intervals: by scene and arm, or a row per arm."""
+    panel, looks = results.panel, looks_of(results, results.arms)
+    if len(panel.scenes) > 1 and 1 < len(panel.arms) <= _MOST_ARMS:
+        drawn, where = _by_scene(panel, looks, results.scenes), "by scene, and "
+    else:
+        drawn, where = _by_arm(panel, looks), ""
+    return Drawing(name=name, caption=_caption(results.notes[0], where), figure=drawn)
 
 
-def _by_scene(panel: Panel, looks: Mapping[str, Look], note: str, wanted: Sequence[str]) -> Drawing:
-    scenes = [scene for scene in wanted if scene in panel.scenes] or list(panel.scenes)
+def _by_scene(panel: Panel, looks: Mapping[str, Look], scenes: Sequence[str]) -> Figure:
     rows = [*scenes, "all scenes"]
-    figure = canvas.new_figure(canvas.PAGE_IN, 1.0 + 0.36 * len(rows))
-    axes = figure.add_subplot()
+    drawn = base.new_figure(base.PAGE_IN, 1.0 + 0.36 * len(rows))
+    axes = drawn.add_subplot()
     offsets = np.linspace(-0.5, 0.5, len(panel.arms)) * _SPREAD
     for arm, offset in zip(panel.arms, offsets, strict=True):
         rates = [_rate_in(panel, arm, panel.scenes.index(scene)) for scene in scenes]
         _draw_rates(axes, [*rates, _rate_of(panel, arm)], np.arange(len(rows)) + offset, looks[arm], arm)
-    axes.axhline(len(rows) - 1.5, color=canvas.GREY, lw=0.6)
+    axes.axhline(len(rows) - 1.5, color=base.GREY, lw=0.6)
     for edge in range(1, len(rows) - 1):
         axes.axhline(edge - 0.5, color="#E4E4E4", lw=0.5, zorder=0)
     _finish(axes, rows)
-    figure.legend(loc="outside upper center", ncols=len(panel.arms), fontsize=8)
-    return Drawing(name="success", caption=_caption(note, "by scene, and "), figure=figure)
+    drawn.legend(loc="outside upper center", ncols=len(panel.arms), fontsize=8)
+    return drawn
 
 
-def _by_arm(panel: Panel, looks: Mapping[str, Look], note: str) -> Drawing:
-    figure = canvas.new_figure(canvas.PAGE_IN, 0.8 + 0.24 * len(panel.arms))
-    axes = figure.add_subplot()
+def _by_arm(panel: Panel, looks: Mapping[str, Look]) -> Figure:
+    drawn = base.new_figure(base.PAGE_IN, 0.8 + 0.24 * len(panel.arms))
+    axes = drawn.add_subplot()
     for place, arm in enumerate(panel.arms):
         _draw_rates(axes, [_rate_of(panel, arm)], np.array([float(place)]), looks[arm], arm)
     _finish(axes, [f"{arm} (n = {panel.n(arm)})" for arm in panel.arms])
-    return Drawing(name="success", caption=_caption(note, ""), figure=figure)
+    return drawn
 
 
 def _rate_in(panel: Panel, arm: str, scene: int) -> tuple[float, Interval]:
@@ -62,7 +67,7 @@ def _rate_in(panel: Panel, arm: str, scene: int) -> tuple[float, Interval]:
 
 
 def _rate_of(panel: Panel, arm: str) -> tuple[float, Interval]:
-    found = estimate(panel, shown.RATE, arm)
+    found = estimate(panel, RATE, arm)
     return found.mean, found.interval
 
 
@@ -82,7 +87,7 @@ def _draw_rates(
 def _finish(axes: Axes, rows: Sequence[str]) -> None:
     axes.set_yticks(range(len(rows)), rows)
     axes.set(xlabel="success [%]", xlim=(0.0, 100.0), ylim=(len(rows) - 0.5, -0.5))
-    canvas.tidy(axes, grid="x")
+    base.tidy(axes, grid="x")
     axes.tick_params(axis="y", length=0)
 
 

@@ -6,8 +6,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-
 from tests.contract.test_planner_contract import LIMITS, ask
+
 from tests.voxel_paths import is_path, random_grid, turning
 from uavexp.check.fields import box, empty, field_from
 from uavexp.errors import ConfigError

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from tests.contract.test_planner_contract import LIMITS, ask
+
 from tests.folders import SHARED
 from tests.voxel_paths import is_path, random_grid, shortest
 from uavexp.check.fields import box, empty, field_from

@@ -1,0 +1,254 @@
+"""Judges: whether what a paper claims of its arms holds here, and the numbers that this rests on.
+
+A claim in an experiment's file names its judge; the judge's arguments are the claim's other keys. The
+first of `arms` is the one that the claim speaks for.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from uavexp.report import number_format, statistics
+from uavexp.report.comparison import (
+    FEWEST_SCENES,
+    Difference,
+    compare,
+    estimate,
+    interval_of,
+    pairs_of,
+)
+from uavexp.report.labels import CLEARANCE, RATE, REPLANS, Metric
+from uavexp.report.paired import PairedTest, paired_tests
+from uavexp.report.results import Results
+from uavexp.report.significance import ALPHA, holm, smallest_p
+from uavexp.report.statistics import Interval
+
+RULE = (
+    "A claimed direction is reproduced when the difference has that sign and its p value (sign flips of "
+    "whole scenes, two-sided, Holm-corrected over the comparisons of one metric) is below 0.05; not "
+    "reproduced when it has not; not testable without the trials or with so few scenes that no p value "
+    "could be below 0.05. Lengths, times, tracking and smoothness are judged where both arms succeeded: a "
+    "path cut short by failure is not a shorter path."
+)
+
+
+class Verdict(StrEnum):
+    """Whether a claim of the paper holds here."""
+
+    REPRODUCED = "reproduced"
+    NOT_REPRODUCED = "not reproduced"
+    NOT_TESTABLE = "not testable"
+
+
+Ruling = tuple[Verdict, str]  # with the numbers it rests on, or the reason why it cannot be tested
+
+
+def better(results: Results, *, arms: Sequence[str], metric: Metric) -> Ruling:
+    """The first arm is better than the second (`RULE`)."""
+    first, second = arms
+    tests = results.tests if (first, second) in results.comparisons else ()
+    for test in tests or paired_tests(results.panel, [metric], [(first, second)]):
+        same = (test.metric, test.first, test.second) == (metric, first, second)
+        if same and test.both_succeeded == metric.needs_arrival:
+            return _direction(test), _numbers(test)
+    return Verdict.NOT_TESTABLE, "the trials do not have it"
+
+
+def better_in_any(results: Results, *, arms: Sequence[str], metrics: Sequence[Metric]) -> Ruling:
+    """The first arm is better than the second in one of the metrics (Bonferroni-corrected)."""
+    first, second = arms
+    tests = [
+        test for test in paired_tests(results.panel, metrics, [(first, second)]) if not test.both_succeeded
+    ]
+    corrected = [replace(test, p=min(1.0, len(tests) * test.found.p)) for test in tests]
+    verdict = min(map(_direction, corrected), key=list(Verdict).index)
+    return verdict, "; ".join(map(_numbers, tests)) + f"; p times {len(tests)} for the verdict"
+
+
+def _direction(test: PairedTest) -> Verdict:
+    if not test.found.pairs or smallest_p(test.found.units) > ALPHA:
+        return Verdict.NOT_TESTABLE
+    found = test.p < ALPHA and test.found.mean * test.metric.better > 0.0
+    return Verdict.REPRODUCED if found else Verdict.NOT_REPRODUCED
+
+
+def _numbers(test: PairedTest) -> str:
+    found, digits = test.found, test.metric.digits
+    if not found.pairs:
+        return "no worlds in which both arms succeeded" if test.both_succeeded else "no common worlds"
+    shown = "" if test.p < ALPHA else " (none shown)"
+    among = ", both succeeded" if test.both_succeeded else ""
+    few = "" if smallest_p(found.units) <= ALPHA else f"; p cannot be below {smallest_p(found.units):.2g}"
+    return (
+        f"{test.metric.label}: {number_format.number(found.first_mean, digits)} ({test.first}) against "
+        f"{number_format.number(found.second_mean, digits)} ({test.second}), difference "
+        f"{number_format.difference(found, test.metric)}{shown}, p = {number_format.p_value(test.p)}, "
+        f"{found.pairs} pairs{among}{few}"
+    )
+
+
+def no_worse(results: Results, *, arms: Sequence[str], metric: Metric, margin: float) -> Ruling:
+    """The first arm is worse than the second by less than a margin (in the unit shown), or undecided."""
+    first, second = arms
+    found = compare(pairs_of(results.panel, first, second, [metric]), metric)
+    worse = Interval(*sorted(-metric.better * end for end in _ends(found)))
+    if worse.high < margin:
+        verdict = Verdict.REPRODUCED
+    else:
+        verdict = Verdict.NOT_REPRODUCED if worse.low > 0.0 else Verdict.NOT_TESTABLE
+    return verdict, (
+        f"{metric.label} against {second}: {number_format.difference(found, metric)}, {found.pairs} pairs; "
+        f"reproduced when the interval rules out a worsening by {margin:g}, not reproduced when it shows a "
+        "worsening and does not rule that out, else undecided"
+    )
+
+
+def _ends(found: Difference) -> Interval:
+    """Interval of a difference; where it is the same in every pair, as when nothing happened, itself."""
+    alike = math.isnan(found.interval.low) and found.units >= FEWEST_SCENES
+    return Interval(found.mean, found.mean) if alike else found.interval
+
+
+def no_worse_in_any_scene(results: Results, *, arms: Sequence[str], metric: Metric) -> Ruling:
+    """In no scene is the first arm's mean worse than the second's."""
+    (first, second), scenes = arms, results.panel.scenes
+    pairs = pairs_of(results.panel, first, second, [metric])
+    if len(scenes) < 2:
+        return Verdict.NOT_TESTABLE, "a single scene"
+    gain = metric.better * pairs.columns[metric.column] @ (1.0, -1.0)
+    worse = [name for number, name in enumerate(scenes) if np.nansum(gain[pairs.scene == number]) < 0.0]
+    return (
+        Verdict.NOT_REPRODUCED if worse else Verdict.REPRODUCED,
+        f"less often in {len(worse)} of {len(scenes)} scenes" + (f": {', '.join(worse)}" if worse else ""),
+    )
+
+
+def none(results: Results, *, arms: Sequence[str], metric: Metric, event: str) -> Ruling:
+    """No flight of the arm has the event that the metric counts."""
+    (arm,) = arms
+    counts = results.panel.values(metric, arm)
+    n, hit = int(np.isfinite(counts).sum()), int((counts > 0.0).sum())
+    if not n:
+        return Verdict.NOT_TESTABLE, "no flight"
+    low, high = statistics.wilson_interval(hit, n)
+    share, *ends = (number_format.number(100.0 * value, 1) for value in (hit / n, low, high))
+    verdict = Verdict.NOT_REPRODUCED if hit else Verdict.REPRODUCED
+    return verdict, f"{hit} of {n} flights with {event}, {share} % [{', '.join(ends)}]"
+
+
+def saved(results: Results, *, arms: Sequence[str], metric: Metric, percent: float) -> Ruling:
+    """The first arm has so many percent less of the metric than the second, by the ratio of the means."""
+    panel, (first, second) = results.panel, arms
+    means = [estimate(panel, metric, arm) for arm in arms]
+    if not means[0].n or not means[1].mean > 0.0:
+        return Verdict.NOT_TESTABLE, f"{second} has none"
+    samples = panel.samples(metric)
+    ratio = samples[:, panel.arms.index(first)] / samples[:, panel.arms.index(second)]
+    ends = interval_of(100.0 * (1.0 - ratio), statistics.units_of(panel.cluster))
+    found = number_format.number(100.0 * (1.0 - means[0].mean / means[1].mean), 0)
+    return _within(percent, ends), (
+        f"saved: {found} % {number_format.interval(ends, 0)}; reproduced when the printed share lies in the "
+        "interval"
+    )
+
+
+def value(results: Results, *, arms: Sequence[str], metric: Metric) -> Ruling:
+    """The arm's mean is the one that the paper prints (`reference.csv`)."""
+    (arm,) = arms
+    printed = results.printed.get((metric.column, arm))
+    if printed is None:
+        return Verdict.NOT_TESTABLE, "the paper prints no such number"
+    found = estimate(results.panel, metric, arm)
+    mean = number_format.mean_with_interval(found, metric, found.n)
+    return (
+        _within(printed.mean, found.interval),
+        f"{mean}; reproduced when the printed mean lies in the interval",
+    )
+
+
+def _within(printed: float, ends: Interval) -> Verdict:
+    if math.isnan(ends.low):
+        return Verdict.NOT_TESTABLE
+    return Verdict.REPRODUCED if ends.low <= printed <= ends.high else Verdict.NOT_REPRODUCED
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Rival:
+    """One arm against another: success, clearance, replans, and the probability of all three."""
+
+    arm: str
+    success: Difference
+    clearance: Difference
+    replans: Difference
+
+    @property
+    def p(self) -> float:
+        """All three must hold: the largest of their p values (Berger 1982, intersection-union test)."""
+        return max(self.success.p, self.clearance.p, self.replans.p)
+
+
+def trade_off(
+    results: Results, *, arms: Sequence[str], success_percent: float = 5.0, clearance_m: float = 0.02
+) -> Ruling:
+    """One of the arms before the last has as much success and clearance as that, with fewer replans.
+
+    Args:
+        results: of the study.
+        arms: any number that the claim speaks for, then the one they are compared with.
+        success_percent: how much less success still counts as as much.
+        clearance_m: how much less clearance does.
+    """
+    *own, other = arms
+    rivals = [_rival(results, arm, other, success_percent, clearance_m) for arm in own]
+    paired = [rival for rival in rivals if math.isfinite(rival.p)]
+    if not paired:
+        return Verdict.NOT_TESTABLE, "no common worlds"
+    corrected = holm(np.array([rival.p for rival in paired]))
+    best = int(np.argmin(corrected))
+    rival, p = paired[best], float(corrected[best])
+    verdict = Verdict.REPRODUCED if p < ALPHA else Verdict.NOT_REPRODUCED
+    if len(paired) * smallest_p(rival.success.units, "greater") > ALPHA:
+        verdict = Verdict.NOT_TESTABLE
+    return verdict, (
+        f"nearest: {rival.arm}, success {number_format.difference(rival.success, RATE)} points, "
+        f"clearance {number_format.difference(rival.clearance, CLEARANCE)} m, "
+        f"replans {number_format.difference(rival.replans, REPLANS)}; p = {number_format.p_value(p)} (sign "
+        f"flips of scenes for all three, success less by under {success_percent:g} points and "
+        f"clearance by under {clearance_m:g} m allowed, Holm over {len(paired)} arms)"
+    )
+
+
+def _rival(results: Results, arm: str, other: str, success_percent: float, clearance_m: float) -> _Rival:
+    pairs = pairs_of(results.panel, arm, other, (RATE, CLEARANCE, REPLANS))
+    return _Rival(
+        arm=arm,
+        success=compare(pairs, RATE, margin=success_percent, alternative="greater"),
+        clearance=compare(pairs, CLEARANCE, margin=clearance_m, alternative="greater"),
+        replans=compare(pairs, REPLANS, alternative="less"),
+    )
+
+
+def not_testable(results: Results, *, why: str) -> Ruling:
+    """Nothing flown here tells; the claim says why."""
+    return Verdict.NOT_TESTABLE, why
+
+
+JUDGES: dict[str, Callable[..., Ruling]] = {
+    judge.__name__: judge
+    for judge in (
+        better,
+        better_in_any,
+        no_worse,
+        no_worse_in_any_scene,
+        none,
+        saved,
+        value,
+        trade_off,
+        not_testable,
+    )
+}

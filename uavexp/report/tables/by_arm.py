@@ -1,0 +1,76 @@
+"""A row per arm, a column per metric: mean and interval."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from uavexp.arrays import Bool, Float
+from uavexp.report import number_format
+from uavexp.report.comparison import Panel, estimate
+from uavexp.report.labels import CLEARANCE, RATE, REPLANS, Metric
+from uavexp.report.results import FAILED, INTERVALS, Results
+from uavexp.report.tables.base import Table
+
+_JUDGED = (RATE, CLEARANCE, REPLANS)
+_FRONT = (
+    "Front: by the means, no other arm is at least as good in success, clearance and replans and better in "
+    "one of them."
+)
+
+
+def table(
+    results: Results,
+    *,
+    name: str,
+    metrics: Sequence[Metric],
+    title: str = "",
+    notes: Sequence[str] = (),
+    front: bool = False,
+) -> Table:
+    """How each arm did, with `front` also whether it is on the front of success, clearance and replans."""
+    panel = results.panel
+    shown = results.occurring(metrics)
+    rows = [
+        (
+            arm,
+            str(panel.n(arm)),
+            *(
+                number_format.mean_with_interval(estimate(panel, metric, arm), metric, panel.n(arm))
+                for metric in shown
+            ),
+        )
+        for arm in panel.arms
+    ]
+    made = Table(
+        name=name,
+        title=title or results.study.title or "How each configuration did",
+        columns=("", "n", *(metric.label for metric in shown)),
+        rows=tuple(rows),
+        notes=(*results.notes, *notes, INTERVALS, FAILED),
+        means=tuple(metrics),
+    )
+    return _with_front(made, panel) if front else made
+
+
+def _with_front(made: Table, panel: Panel) -> Table:
+    judged = [metric for metric in _JUDGED if panel.has(metric)]
+    means = [[metric.better * estimate(panel, metric, arm).mean for metric in judged] for arm in panel.arms]
+    marks = ("front" if mark else "" for mark in on_front(np.array(means)))
+    rows = tuple((*row, mark) for row, mark in zip(made.rows, marks, strict=True))
+    return replace(made, columns=(*made.columns, "front"), rows=rows, notes=(*made.notes, _FRONT))
+
+
+def on_front(points: Float) -> Bool:
+    """Which points no other point is at least as good as in everything and better in something.
+
+    Args:
+        points: (N, D), more is better; NaN is never on the front and excludes nobody.
+    """
+    comparable = np.where(np.isfinite(points), points, -np.inf)
+    at_least = np.all(comparable[None] >= comparable[:, None], axis=2)
+    better = np.any(comparable[None] > comparable[:, None], axis=2)
+    beaten = np.any(at_least & better, axis=1)
+    return np.asarray(~beaten & np.all(np.isfinite(points), axis=1))
