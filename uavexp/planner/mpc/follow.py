@@ -11,7 +11,7 @@ from uavexp.arrays import Float
 from uavexp.braking import with_stop
 from uavexp.planner.movers.moving import MovingObstacles
 from uavexp.planner.mpc.guide import Guide, StaticPlanner, phase_of
-from uavexp.planner.mpc.horizon import HorizonModel, Motion, Scene, Tracked, to_trajectory, track
+from uavexp.planner.mpc.horizon import HorizonModel, Rollout, Surroundings, Tracked, to_trajectory, track
 from uavexp.planner.mpc.rejoin import BLENDS_S, rejoined, state_at
 from uavexp.planner.shape.excess import instants, limit_excess
 from uavexp.planner.shape.start import state_of
@@ -82,15 +82,15 @@ class Follower:
         """
         kept, model = self.static.constraints, self.model
         ahead_s = model.step_s * np.arange(1.0, model.steps + 1.0)
-        wanted = Motion(*evaluate(with_stop(guide.spline, kept.limits), phase_s + ahead_s))
+        wanted = Rollout(*evaluate(with_stop(guide.spline, kept.limits), phase_s + ahead_s))
         clearance_m, table = kept.min_clearance_m + _ABOVE_M, moving.table(request.time_s)
-        scene = Scene(request.field, clearance_m, table, request.flight_bounds_m)
+        around = Surroundings(request.field, clearance_m, table, request.flight_bounds_m)
         guess = _last_motion(guide, request, ahead_s) or wanted
-        first = track(model, start, wanted, guess, scene, self.limits, self.iterations)
+        first = track(model, start, wanted, guess, around, self.limits, self.iterations)
         if first.slack_m <= SLACK_M or not len(moving):
             return first
-        stop = Motion(*evaluate(self.static.brake(request), request.time_s + ahead_s))
-        second = track(model, start, wanted, stop, scene, self.limits, self.iterations)
+        stop = Rollout(*evaluate(self.static.brake(request), request.time_s + ahead_s))
+        second = track(model, start, wanted, stop, around, self.limits, self.iterations)
         better = second if second.slack_m < first.slack_m else first
         return better._replace(iterations=first.iterations + second.iterations)
 
@@ -108,13 +108,13 @@ class Follower:
         return not self.static.shortfall(request, evaluate(trajectory, instants(trajectory))[0])
 
 
-def _last_motion(guide: Guide, request: PlanRequest, ahead_s: Float) -> Motion | None:
+def _last_motion(guide: Guide, request: PlanRequest, ahead_s: Float) -> Rollout | None:
     """The last plan at these times ahead, when the request follows on from it: the warm start."""
     if guide.flown is None or not guide.flown.start_s <= request.time_s <= guide.flown.end_s:
         return None
     if np.abs(state_at(guide.flown, request.time_s)[0] - request.position_m).max() > _SAME_M:
         return None
-    return Motion(*evaluate(guide.flown, request.time_s + ahead_s))
+    return Rollout(*evaluate(guide.flown, request.time_s + ahead_s))
 
 
 def least_room_m(moving: MovingObstacles, trajectory: Trajectory, from_s: float) -> float:

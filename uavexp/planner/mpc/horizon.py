@@ -30,14 +30,13 @@ from uavexp.braking import jerk_mps3
 from uavexp.field import DistanceField
 from uavexp.planner.mpc.regions import mover_planes, static_planes
 from uavexp.planner.shape.qp import solve_qp
-from uavexp.planner.shape.static_step import FAN, frames
+from uavexp.planner.shape.scp_step import NEAR_BOUND_M, NEAR_LIMIT
+from uavexp.planner.shape.static_step import touching
 from uavexp.trajectory import Trajectory
 from uavexp.types import Limits
 
 _SLACK_PRICE, _SLACK_BEND = 200.0, 2000.0  # ρ per m and per m²
 _QP_SHARE = 0.97  # of the limits inside the QP: room for its linearisation and between steps
-_NEAR_LIMIT = 0.6
-_NEAR_BOUND_M = 0.5
 
 
 class HorizonModel(NamedTuple):
@@ -54,7 +53,7 @@ class HorizonModel(NamedTuple):
     change: Float  # (3N, 4N) u_k - u_{k-1} of every axis, of inputs and slacks
 
 
-class Motion(NamedTuple):
+class Rollout(NamedTuple):
     """Places, velocities and accelerations at the steps 1 .. N, each (N, 3)."""
 
     place: Float
@@ -62,7 +61,7 @@ class Motion(NamedTuple):
     acceleration: Float
 
 
-class Scene(NamedTuple):
+class Surroundings(NamedTuple):
     """What the motion must keep out of."""
 
     field: DistanceField
@@ -74,7 +73,7 @@ class Scene(NamedTuple):
 class Tracked(NamedTuple):
     """Answer of the horizon."""
 
-    motion: Motion | None  # None: the solver failed
+    motion: Rollout | None  # None: the solver failed
     slack_m: float  # largest depth in a region, as the last QP sees it
     iterations: int  # QPs solved
 
@@ -123,9 +122,9 @@ def horizon_model(
 def track(
     model: HorizonModel,
     start: Float,
-    wanted: Motion,
-    guess: Motion,
-    scene: Scene,
+    wanted: Rollout,
+    guess: Rollout,
+    around: Surroundings,
     limits: Limits,
     rounds: int,
 ) -> Tracked:
@@ -136,7 +135,7 @@ def track(
         start: (3, 3) position, velocity and acceleration now.
         wanted: the reference x_ref.
         guess: motion to linearise around first.
-        scene: regions, relative to the time of `start`.
+        around: regions, relative to the time of `start`.
         limits: of the vehicle.
         rounds: QPs to be solved.
     """
@@ -155,7 +154,7 @@ def track(
     lower = np.concatenate([np.full(3 * n, -most), np.zeros(n), present - change])
     motion, slack = guess, np.zeros(n)
     for done in range(rounds):
-        rows, least = _rows(model, start, motion, scene, limits)
+        rows, least = _rows(model, start, motion, around, limits)
         solution, flag = solve_qp(
             hessian,
             gradient,
@@ -170,14 +169,14 @@ def track(
     return Tracked(motion, float(slack.max()), rounds)
 
 
-def roll_out(model: HorizonModel, start: Float, inputs: Float) -> Motion:
+def roll_out(model: HorizonModel, start: Float, inputs: Float) -> Rollout:
     """The motion that inputs (N, 3) make from a start (3, 3)."""
     place = model.place @ inputs + model.place_start @ start
-    return Motion(place, model.speed @ inputs + model.speed_start @ start, inputs)
+    return Rollout(place, model.speed @ inputs + model.speed_start @ start, inputs)
 
 
 def to_trajectory(
-    model: HorizonModel, start: Float, motion: Motion, steps: int, start_s: float
+    model: HorizonModel, start: Float, motion: Rollout, steps: int, start_s: float
 ) -> Trajectory:
     """The first `steps` >= 1 steps of a motion as a trajectory, a cubic each."""
     knots = [np.concatenate([start[row][None], part[:steps]]) for row, part in enumerate(motion)]
@@ -188,16 +187,16 @@ def to_trajectory(
 
 
 def _rows(
-    model: HorizonModel, start: Float, motion: Motion, scene: Scene, limits: Limits
+    model: HorizonModel, start: Float, motion: Rollout, around: Surroundings, limits: Limits
 ) -> tuple[Float, Float]:
     """Rows (R, 4N) and least values (R,) of the QP around a motion."""
-    field = scene.field
+    field = around.field
     ahead_s = model.step_s * np.arange(1.0, model.steps + 1.0)
     grid = (field.distance, field.origin_m, field.voxel_size_m)
     planes = [
-        static_planes(motion.place, *grid, scene.clearance_m),
-        mover_planes(motion.place, motion.velocity, ahead_s, scene.movers),
-        _bound_planes(motion.place, scene.bounds_m),
+        static_planes(motion.place, *grid, around.clearance_m),
+        mover_planes(motion.place, motion.velocity, ahead_s, around.movers),
+        _bound_planes(motion.place, around.bounds_m),
     ]
     step, normal, bound = (np.concatenate(part) for part in zip(*planes, strict=True))
     free = model.place_start @ start
@@ -216,16 +215,16 @@ def _rows(
 
 def _ball_planes(vectors: Float, limit: float) -> tuple[Int, Float, Float]:
     """Half spaces that hold the ball of a norm limit, around vectors (N, 3) that come near it."""
-    step = np.flatnonzero(np.linalg.norm(vectors, axis=1) > _NEAR_LIMIT * limit)
-    normal = -np.einsum("fe,kea->kfa", FAN, frames(vectors[step])).reshape(-1, 3)
-    return np.repeat(step, len(FAN)), normal, np.full(len(normal), -limit)
+    step = np.flatnonzero(np.linalg.norm(vectors, axis=1) > NEAR_LIMIT * limit)
+    normal = -touching(vectors[step])
+    return np.repeat(step, normal.shape[1]), normal.reshape(-1, 3), np.full(normal.size // 3, -limit)
 
 
 def _bound_planes(points: Float, bounds_m: Float) -> tuple[Int, Float, Float]:
     """Half spaces of the flight bounds (2, 3) that places (N, 3) come near."""
     signs = np.array([1.0, -1.0])
     room = signs[:, None] * (points[:, None] - bounds_m)  # (N, 2, 3)
-    step, side, axis = np.nonzero(room < _NEAR_BOUND_M)
+    step, side, axis = np.nonzero(room < NEAR_BOUND_M)
     normal = signs[side, None] * np.eye(3)[axis]
     return step, normal, signs[side] * bounds_m[side, axis]
 

@@ -47,14 +47,13 @@ from uavexp.planner.shape.successive import (
 )
 from uavexp.planner.shape.timing import STEP_M, place_by_time
 from uavexp.planner.spline.cubic import (
-    SAMPLES,
+    make_cubic,
     peak_acceleration,
     peak_speed,
     pin_ends,
     sample_spline,
-    spline_model,
-    to_trajectory,
 )
+from uavexp.planner.spline.uniform import SAMPLES, to_trajectory
 from uavexp.trajectory import Trajectory
 from uavexp.types import PlanRequest
 
@@ -119,7 +118,7 @@ def _end_velocity(route: Route, field: DistanceField, constraints: Constraints, 
 def load() -> None:
     """Take the matrices of every size that is used: no request pays for it."""
     for count in range(10, MOST_POINTS + 1, 2):
-        spline_model(count)
+        make_cubic(count)
 
 
 class _Cubic:
@@ -139,14 +138,14 @@ class _Cubic:
         self.shaper, self.request, self.route, self.rung = shaper, request, route, rung
         self.constraints, self.movers = constraints, movers
         length = STEP_M * (len(route.raw) - 1)
-        matrices = spline_model(control_points(rung.finer * length / shaper.control_spacing_m, 3))
-        self.spans = matrices.control_points - 3
+        spline = make_cubic(control_points(rung.finer * length / shaper.control_spacing_m, 3))
+        self.spans, self.power = len(spline.velocity) - 2, spline.power
         limits, field = constraints.limits, request.field
-        samples = len(matrices.position)
+        samples = len(spline.samples)
         self.merit = Merit(
             h=0.0,
-            energy=matrices.energy,
-            position=matrices.position,
+            energy=spline.effort,
+            position=spline.samples,
             distance=field.distance,
             origin_m=field.origin_m,
             voxel_m=field.voxel_size_m,
@@ -230,4 +229,4 @@ class _Cubic:
     def trajectory(self, curve: Curve) -> Trajectory:
         """`Model.trajectory`."""
         request = self.request
-        return to_trajectory(curve.control, curve.h, request.time_s, request.goal.is_target)
+        return to_trajectory(self.power, curve.control, curve.h, request.time_s, request.goal.is_target)

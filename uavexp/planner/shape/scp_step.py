@@ -18,16 +18,15 @@ import numpy as np
 from uavexp.arrays import Float, Float32
 from uavexp.field import value_and_gradient
 from uavexp.planner.movers.moving import clearance_after
-from uavexp.planner.spline.cubic import SAMPLES
+from uavexp.planner.spline.uniform import SAMPLES
 
 HARD_WEIGHT = 10.0
-_NEAR_LIMIT = 0.6
-_NEAR_BOUND_M = 0.5
-_EXCESS_WEIGHT = 1000.0  # of relative excess over a limit in the merit: an exact penalty
+NEAR_LIMIT, NEAR_BOUND_M = 0.6, 0.5  # what is farther from its limit gets no row
+EXCESS_WEIGHT = 1000.0  # of relative excess over a limit in the merit: an exact penalty
 _HARD_STARTS = 4  # first accelerations, where a moving start leaves the least freedom
 # half spaces around a vector, in (along, level across, up from both): towards it and 24° from it,
 # then to the other sides as well
-_FAN = np.array(
+FAN = np.array(
     [
         [1.0, 0.0, 0.0],
         [0.91, 0.4146083, 0.0],
@@ -47,7 +46,7 @@ class Merit(NamedTuple):
     """What a curve is judged by, all but its control points."""
 
     h: float  # knot spacing, s
-    energy: Float  # (N, N) of the spline (`SplineModel`)
+    energy: Float  # (N, N) of the spline (`Uniform.effort`)
     position: Float  # (S, N) its samples
     distance: Float32  # the map
     origin_m: Float
@@ -81,8 +80,8 @@ def merit(control: Float, by: Merit) -> float:
         for axis in range(3):
             fast += (control[i + 1, axis] - control[i, axis]) ** 2
             strong += (control[i - 1, axis] - 2.0 * control[i, axis] + control[i + 1, axis]) ** 2
-        total += _EXCESS_WEIGHT * max(np.sqrt(fast) / (h * by.limits[0]) - 1.0, 0.0)
-        total += _EXCESS_WEIGHT * max(np.sqrt(strong) / (h * h * by.limits[1]) - 1.0, 0.0)
+        total += EXCESS_WEIGHT * max(np.sqrt(fast) / (h * by.limits[0]) - 1.0, 0.0)
+        total += EXCESS_WEIGHT * max(np.sqrt(strong) / (h * h * by.limits[1]) - 1.0, 0.0)
     points = _samples(control, by.position)
     d = _felt_m(points, 1, by)
     share = h / SAMPLES
@@ -277,16 +276,16 @@ def limit_rows(control: Float, h: float, limits: Float, bounds: Float) -> tuple[
                     vector[axis] += stencil[order, j] * control[i + j, axis]
             norm = np.sqrt((vector * vector).sum())
             hard = order == 1 and i <= _HARD_STARTS
-            if not hard and norm < _NEAR_LIMIT * limit:
+            if not hard and norm < NEAR_LIMIT * limit:
                 continue
             frame = _frame(vector)
             for turn in range(10 if hard else 1 + 2 * order):
                 sides[size] = limit
                 for axis in range(3):
                     normal[axis] = (
-                        _FAN[turn, 0] * frame[0, axis]
-                        + _FAN[turn, 1] * frame[1, axis]
-                        + _FAN[turn, 2] * frame[2, axis]
+                        FAN[turn, 0] * frame[0, axis]
+                        + FAN[turn, 1] * frame[1, axis]
+                        + FAN[turn, 2] * frame[2, axis]
                     )
                     sides[size] -= normal[axis] * vector[axis]
                 for j in range(2 + order):
@@ -299,7 +298,7 @@ def limit_rows(control: Float, h: float, limits: Float, bounds: Float) -> tuple[
             for side in range(2):
                 sign = 2.0 * side - 1.0  # -1 at the lower bound, 1 at the upper
                 room = sign * (bounds[side, axis] - control[i, axis])
-                if room < _NEAR_BOUND_M:
+                if room < NEAR_BOUND_M:
                     rows[size, 3 * (i - 3) + axis] = sign
                     sides[size] = room
                     size += 1

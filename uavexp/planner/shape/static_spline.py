@@ -177,4 +177,4 @@ class _AnyOrder:
     def trajectory(self, curve: Curve) -> Trajectory:
         """`Model.trajectory`."""
         at_rest = self.request.goal.is_target
-        return to_trajectory(self.basis, curve.control, curve.h, self.request.time_s, at_rest)
+        return to_trajectory(self.basis.power, curve.control, curve.h, self.request.time_s, at_rest)

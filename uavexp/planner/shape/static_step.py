@@ -13,23 +13,19 @@ import numpy as np
 
 from uavexp.arrays import Float, Float32
 from uavexp.field import DistanceField, value_and_gradient
-from uavexp.planner.shape.scp_step import around, clearance_cost, cost_model
+from uavexp.planner.shape.scp_step import (
+    EXCESS_WEIGHT,
+    FAN,
+    NEAR_BOUND_M,
+    NEAR_LIMIT,
+    around,
+    clearance_cost,
+    cost_model,
+)
 from uavexp.planner.shape.successive import QP_SHARE
 from uavexp.planner.spline.uniform import SAMPLES, Uniform
 
-_EXCESS_WEIGHT = 1000.0  # of relative excess over a limit in the merit: an exact penalty
-_NEAR_LIMIT, _NEAR_BOUND_M = 0.6, 0.5  # what is farther from its limit gets no row
 _SHARES = (1.0, 0.4, 0.16, 0.064)  # of a QP's step, tried in turn
-# half spaces around a vector, in (along, level across, up from both): towards it and 24° from it
-FAN = np.array(
-    [
-        [1.0, 0.0, 0.0],
-        [0.91, 0.4146083, 0.0],
-        [0.91, -0.4146083, 0.0],
-        [0.91, 0.0, 0.4146083],
-        [0.91, 0.0, -0.4146083],
-    ]
-)
 
 
 def frames(vectors: Float) -> Float:
@@ -47,6 +43,11 @@ def frames(vectors: Float) -> Float:
     out[~steep, 1, 2] = 0.0
     out[~steep, 2] = np.cross(out[~steep, 0], out[~steep, 1])
     return out
+
+
+def touching(vectors: Float) -> Float:
+    """Unit normals (K, 5, 3) of half spaces around vectors (K, 3): towards each, and 24° from it."""
+    return np.asarray(np.einsum("fe,kea->kfa", FAN[:5], frames(vectors)))
 
 
 class Cost(NamedTuple):
@@ -94,7 +95,7 @@ def merit(cost: Cost, control: Float, h: float, tied: Float) -> float:
     speeds = np.linalg.norm(basis.velocity @ control, axis=1) / (h * speed)
     strengths = np.linalg.norm(basis.acceleration @ control, axis=1) / (h * h * strength)
     excess = np.maximum(np.concatenate([speeds, strengths]) / QP_SHARE - 1.0, 0.0).sum()
-    return float(energy + h / SAMPLES * (felt + pulled) + _EXCESS_WEIGHT * excess)
+    return float(energy + h / SAMPLES * (felt + pulled) + EXCESS_WEIGHT * excess)
 
 
 def local_model(cost: Cost, control: Float, h: float, tied: Float) -> tuple[Float, Float]:
@@ -132,14 +133,14 @@ def limit_rows(cost: Cost, control: Float, h: float) -> tuple[Float, Float]:
     ):
         vectors = stencil @ control
         movable = np.abs(stencil[:, inner]).max(axis=1) > 0.0
-        near = np.flatnonzero(movable & (np.linalg.norm(vectors, axis=1) > _NEAR_LIMIT * limit))
-        normals = np.einsum("fe,kea->kfa", FAN, frames(vectors[near]))
+        near = np.flatnonzero(movable & (np.linalg.norm(vectors, axis=1) > NEAR_LIMIT * limit))
+        normals = touching(vectors[near])
         row = stencil[near][:, None, inner, None] * normals[:, :, None, :]
-        rows.append(row.reshape(len(near) * len(FAN), len(free)))
+        rows.append(row.reshape(-1, len(free)))
         sides.append((limit - np.einsum("kfa,ka->kf", normals, vectors[near])).reshape(-1))
     for sign, bound in ((-1.0, cost.bounds[0]), (1.0, cost.bounds[1])):
         room = sign * (np.tile(bound, len(free) // 3) - free)
-        near = np.flatnonzero(room < _NEAR_BOUND_M)
+        near = np.flatnonzero(room < NEAR_BOUND_M)
         rows.append(sign * np.eye(len(free))[near])
         sides.append(room[near])
     return np.concatenate(rows), np.concatenate(sides)

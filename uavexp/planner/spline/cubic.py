@@ -1,14 +1,12 @@
-"""Uniform cubic B-splines: the model in CasADi, its matrices, and exact bounds.
+"""Uniform cubic B-splines: their energy and samples written in CasADi, and the kernels of the flown loop.
 
-Control points c_0 .. c_{N-1}, M = N - 3 segments of equal duration h. With u in [0, 1] on
-segment m, r = [1 u u² u³] B [c_m .. c_{m+3}], B the cubic basis (de Boor 1978). Acceleration is
+Control points c_0 .. c_{N-1}, M = N - 3 segments of equal duration h (`uniform`). Acceleration is
 linear on a segment, so its norm is greatest at a knot: the limit at the knots is exact.
 Velocity is a quadratic, bounded by its Bezier points.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache
 
 import casadi as ca
@@ -16,26 +14,14 @@ import numba as nb
 import numpy as np
 
 from uavexp.arrays import Float
-from uavexp.trajectory import Trajectory
-
-SAMPLES = 4  # points per segment at which the obstacle cost is taken, in the middle of equal parts
-BASIS = np.array([[1, 4, 1, 0], [-3, 0, 3, 0], [3, -6, 3, 0], [-1, 3, -3, 1]]) / 6.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SplineModel:
-    """Matrices of one axis of a spline in units of the knot spacing (h = 1), from CasADi."""
-
-    control_points: int  # N
-    energy: Float  # (N, N): ∫ r''² = cᵀ energy c / h³
-    position: Float  # (SAMPLES * M, N): samples = position @ c
+from uavexp.planner.spline.uniform import SAMPLES, Uniform, make_uniform, power_matrix
 
 
 @cache
 def segment_model() -> ca.Function:
     """CasADi function of one segment's control points (4,): its energy and its SAMPLES points."""
     control, u = ca.SX.sym("c", 4), ca.SX.sym("u")
-    position = ca.dot(ca.vertcat(1, u, u**2, u**3), ca.DM(BASIS) @ control)
+    position = ca.dot(ca.vertcat(1, u, u**2, u**3), ca.DM(power_matrix(3)) @ control)
     acceleration = ca.jacobian(ca.jacobian(position, u), u)
     curve = ca.Function("curve", [control, u], [position, acceleration])
     first, last = curve(control, 0)[1], curve(control, 1)[1]
@@ -45,25 +31,23 @@ def segment_model() -> ca.Function:
 
 
 @cache
-def spline_model(control_points: int) -> SplineModel:
+def make_cubic(count: int) -> Uniform:
     """Write the minimum-acceleration problem of one axis in CasADi and take its matrices.
 
     Built once per number of control points and process; every request reuses it.
 
     Args:
-        control_points: N >= 7.
+        count: N >= 7 control points.
     """
-    control = ca.SX.sym("c", control_points)
-    segment = segment_model()
-    parts = [segment(control[m : m + 4]) for m in range(control_points - 3)]
+    control, segment = ca.SX.sym("c", count), segment_model()
+    parts = [segment(control[m : m + 4]) for m in range(count - 3)]
     energy = sum((part[0] for part in parts), ca.SX(0))
     samples = ca.vertcat(*[part[1] for part in parts])
     hessian, position = ca.hessian(energy, control)[0], ca.jacobian(samples, control)
     matrices = ca.Function("matrices", [], [hessian, position])()
-    return SplineModel(
-        control_points=control_points,
-        energy=np.ascontiguousarray(0.5 * matrices["o0"].full()),
-        position=np.ascontiguousarray(matrices["o1"].full()),
+    return make_uniform(3, count)._replace(
+        effort=np.ascontiguousarray(0.5 * matrices["o0"].full()),
+        samples=np.ascontiguousarray(matrices["o1"].full()),
     )
 
 
@@ -146,20 +130,3 @@ def sample_spline(control: Float, per_segment: int) -> Float:
                 + b3 * control[m + 3, axis]
             )
     return points
-
-
-def to_trajectory(control: Float, h: float, start_s: float, at_rest: bool) -> Trajectory:
-    """Trajectory of one cubic piece per segment.
-
-    Args:
-        control: (N, 3), m.
-        h: knot spacing, s.
-        start_s: absolute time of the first knot.
-        at_rest: whether it ends at rest.
-    """
-    segments = control.shape[0] - 3
-    windows = np.stack([control[j : j + segments] for j in range(4)], axis=1)  # (M, 4, 3)
-    coefficients = np.einsum("ij,mjk->mik", BASIS, windows) / h ** np.arange(4)[:, None]
-    return Trajectory(
-        breaks_s=start_s + h * np.arange(segments + 1), coefficients=coefficients, at_rest=at_rest
-    )

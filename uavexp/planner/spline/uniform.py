@@ -36,6 +36,18 @@ class Uniform(NamedTuple):
     last: Float  # (d, d) at the end = last @ c[-d:]
 
 
+def _piece(degree: int) -> BSpline:
+    """The degree + 1 basis functions that are not zero on the span [0, 1]."""
+    return BSpline(np.arange(-degree, degree + 2.0), np.eye(degree + 1), degree)
+
+
+@cache
+def power_matrix(degree: int) -> Float:
+    """P (d+1, d+1): coefficients of a span's polynomial = P @ its control points."""
+    piece = _piece(degree)
+    return np.stack([piece(0.0, nu=j) / factorial(j) for j in range(degree + 1)])
+
+
 @cache
 def make_uniform(degree: int, count: int) -> Uniform:
     """Matrices of a spline; built once per size and process.
@@ -44,10 +56,7 @@ def make_uniform(degree: int, count: int) -> Uniform:
         degree: d >= 3, so that acceleration is continuous.
         count: N >= 2 d + 1 control points.
     """
-    knots = np.arange(-degree, degree + 2.0)
-    piece = BSpline(knots, np.eye(degree + 1), degree)
-    power = np.stack([piece(0.0, nu=j) / factorial(j) for j in range(degree + 1)])
-    spans = count - degree
+    piece, power, spans = _piece(degree), power_matrix(degree), count - degree
     u = (np.arange(SAMPLES) + 0.5) / SAMPLES
     samples, tangents = np.zeros((SAMPLES * spans, count)), np.zeros((SAMPLES * spans, count))
     effort, jerk = np.zeros((count, count)), np.zeros((count, count))
@@ -90,11 +99,18 @@ def pin_ends(basis: Uniform, control: Float, h: float, start: Float, end: Float)
     control[-d:] = np.linalg.solve(basis.last, wanted[1])
 
 
-def to_trajectory(basis: Uniform, control: Float, h: float, start_s: float, at_rest: bool) -> Trajectory:
-    """Trajectory of one polynomial per span, of control points (N, 3)."""
-    spans = len(control) - basis.degree
-    windows = np.stack([control[j : j + spans] for j in range(basis.degree + 1)], axis=1)
-    scale = h ** np.arange(basis.degree + 1)[:, None]
-    coefficients = np.einsum("ij,mjk->mik", basis.power, windows) / scale
+def to_trajectory(power: Float, control: Float, h: float, start_s: float, at_rest: bool) -> Trajectory:
+    """Trajectory of one polynomial per span.
+
+    Args:
+        power: P of the spline's degree.
+        control: (N, 3), m.
+        h: knot spacing, s.
+        start_s: absolute time of the first knot.
+        at_rest: whether it ends at rest.
+    """
+    spans, terms = len(control) - len(power) + 1, np.arange(len(power))
+    windows = np.stack([control[j : j + spans] for j in terms], axis=1)  # (M, d+1, 3)
+    coefficients = np.einsum("ij,mjk->mik", power, windows) / h ** terms[:, None]
     breaks: Float = start_s + h * np.arange(spans + 1.0)
     return Trajectory(breaks_s=breaks, coefficients=coefficients, at_rest=at_rest)

@@ -15,12 +15,12 @@ from uavexp.check.fields import bounds, box, empty, field_from
 from uavexp.errors import ConfigError
 from uavexp.planner.bspline_mpc import BsplineMpc
 from uavexp.planner.movers.moving import MovingObstacles
-from uavexp.planner.mpc.horizon import HorizonModel, Motion, Scene, horizon_model, roll_out, track
+from uavexp.planner.mpc.horizon import HorizonModel, Rollout, Surroundings, horizon_model, roll_out, track
 from uavexp.planner.mpc.horizon import to_trajectory as motion_trajectory
 from uavexp.planner.mpc.regions import static_planes
 from uavexp.planner.mpc.rejoin import blend, rest_of, state_at
 from uavexp.planner.shape.static_step import Cost, local_model, merit
-from uavexp.planner.spline.uniform import make_uniform, pin_ends, to_trajectory
+from uavexp.planner.spline.uniform import make_uniform, pin_ends, power_matrix, to_trajectory
 from uavexp.trajectory import evaluate
 from uavexp.types import Goal, Limits, PlanRequest, PlanStatus, Tracks
 
@@ -81,7 +81,7 @@ def people(time_s: float, *seen: tuple[tuple[float, float], tuple[float, float]]
 def test_spline_is_scipys(order: int) -> None:
     degree, count, h = order - 1, 2 * order + 3, 0.4
     control = np.random.default_rng(order).normal(size=(count, 3))
-    trajectory = to_trajectory(make_uniform(degree, count), control, h, 5.0, True)
+    trajectory = to_trajectory(power_matrix(degree), control, h, 5.0, True)
     knots = 5.0 + h * (np.arange(count + degree + 1.0) - degree)
     times = np.linspace(5.0, trajectory.end_s, 50)
     position, velocity, acceleration = evaluate(trajectory, times)
@@ -111,7 +111,7 @@ def test_first_and_last_points_say_how_it_begins_and_ends(order: int) -> None:
     basis = make_uniform(degree, 14)
     pin_ends(basis, control, 0.3, start, end)
     np.testing.assert_array_equal(control[degree:-degree], inner)  # N - 2 (k - 1) stay free
-    trajectory = to_trajectory(basis, control, 0.3, 0.0, True)
+    trajectory = to_trajectory(basis.power, control, 0.3, 0.0, True)
     np.testing.assert_allclose(state_at(trajectory, 0.0), start, atol=1e-9)
     np.testing.assert_allclose(state_at(trajectory, trajectory.end_s), end, atol=1e-8)
 
@@ -158,20 +158,20 @@ def small_horizon() -> HorizonModel:
     return horizon_model(20, 0.1, 0.3, 5.0, 0.01)
 
 
-def open_scene(tracks: Tracks | None = None, margin_m: float = 0.0) -> Scene:
+def open_scene(tracks: Tracks | None = None, margin_m: float = 0.0) -> Surroundings:
     grid = empty((40.0, 40.0, 4.0), voxel_m=0.2)
     moving = MovingObstacles(
         tracks=tracks or Tracks.none(), body_radius_m=LIMITS.body_radius_m, margin_m=margin_m, horizon_s=9.0
     )
     field = field_from(grid, voxel_m=0.2, origin_m=(-20.0, -20.0, -1.0))
-    return Scene(field, 0.3, moving.table(0.0), np.array([[-20.0, -20.0, -1.0], [20.0, 20.0, 3.0]]))
+    return Surroundings(field, 0.3, moving.table(0.0), np.array([[-20.0, -20.0, -1.0], [20.0, 20.0, 3.0]]))
 
 
-def straight(model: HorizonModel, speed_mps: float) -> Motion:
+def straight(model: HorizonModel, speed_mps: float) -> Rollout:
     times = model.step_s * np.arange(1.0, model.steps + 1.0)
     velocity = np.array([speed_mps, 0.0, 0.0])
     place = np.array([0.0, 0.0, 1.0]) + times[:, None] * velocity
-    return Motion(place, np.tile(velocity, (model.steps, 1)), np.zeros((model.steps, 3)))
+    return Rollout(place, np.tile(velocity, (model.steps, 1)), np.zeros((model.steps, 3)))
 
 
 def test_casadi_rolls_out_what_is_flown() -> None:
@@ -294,7 +294,7 @@ def test_blend_meets_both_ends() -> None:
 @pytest.mark.parametrize("from_s", [2.0, 2.05, 2.4, 3.39])
 def test_rest_is_the_same_curve_later(from_s: float) -> None:
     control = np.random.default_rng(4).normal(size=(10, 3))
-    whole = to_trajectory(make_uniform(3, 10), control, 0.2, 2.0, True)
+    whole = to_trajectory(power_matrix(3), control, 0.2, 2.0, True)
     rest = rest_of(whole, from_s, 50.0)
     assert rest is not None
     times = np.linspace(0.0, whole.end_s - from_s, 40)[:-1]

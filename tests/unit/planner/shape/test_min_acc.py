@@ -14,7 +14,8 @@ from uavexp.errors import ConfigError
 from uavexp.field import DistanceField
 from uavexp.geometry import polyline_length_m
 from uavexp.planner.min_acc import MinAcc
-from uavexp.planner.spline.cubic import BASIS, segment_model
+from uavexp.planner.spline.cubic import segment_model
+from uavexp.planner.spline.uniform import power_matrix
 from uavexp.trajectory import Trajectory, evaluate
 from uavexp.types import Goal, Limits, PlanRequest, PlanStatus
 
@@ -96,7 +97,7 @@ def test_free_flight_is_the_optimum_of_the_same_problem_in_casadi() -> None:
     for axis in range(3):
         for m in range(segments):
             cost += segment_model()(control[m : m + 4, axis])[0]
-    rows = ca.DM(BASIS)
+    rows = ca.DM(power_matrix(3))
     ends = ((0, asked.position_m, asked.velocity_mps, asked.acceleration_mps2),)
     for first, position, velocity, acceleration in ends:
         window = control[first : first + 4, :]
@@ -111,7 +112,7 @@ def test_free_flight_is_the_optimum_of_the_same_problem_in_casadi() -> None:
     opti.solver("qrqp", {"print_iter": False, "print_header": False, "print_info": False})
     best = opti.solve().value(control)
     windows = np.stack([best[j : j + segments] for j in range(4)], axis=1)
-    expected = np.einsum("ij,mjk->mik", BASIS, windows) / h ** np.arange(4)[:, None]
+    expected = np.einsum("ij,mjk->mik", power_matrix(3), windows) / h ** np.arange(4)[:, None]
     np.testing.assert_allclose(trajectory.coefficients, expected, atol=2e-3)
 
 

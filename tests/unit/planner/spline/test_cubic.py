@@ -8,14 +8,13 @@ import pytest
 from uavexp.arrays import Float
 from uavexp.planner.shape.timing import place_by_time, resample, smooth, time_profile
 from uavexp.planner.spline.cubic import (
-    SAMPLES,
+    make_cubic,
     peak_acceleration,
     peak_speed,
     pin_ends,
     sample_spline,
-    spline_model,
-    to_trajectory,
 )
+from uavexp.planner.spline.uniform import SAMPLES, power_matrix, to_trajectory
 from uavexp.trajectory import evaluate, join
 
 H_S = 0.4
@@ -27,21 +26,21 @@ def random_control(seed: int, count: int = 12) -> Float:
 
 @pytest.mark.parametrize("count", [10, 17])
 def test_model_matches_the_curve(count: int) -> None:
-    control, model = random_control(0, count), spline_model(count)
-    trajectory = to_trajectory(control, H_S, 0.0, False)
+    control, model = random_control(0, count), make_cubic(count)
+    trajectory = to_trajectory(power_matrix(3), control, H_S, 0.0, False)
     segments = count - 3
     # Gauss-Legendre on each segment is exact for the square of a linear function
     nodes, weights = np.polynomial.legendre.leggauss(3)
     times = (np.arange(segments)[:, None] + 0.5 * (nodes + 1.0)).ravel() * H_S
     square = (evaluate(trajectory, times)[2] ** 2).sum(axis=1).reshape(segments, -1)
     energy = float((square * weights).sum() * 0.5 * H_S)
-    assert np.einsum("ia,ij,ja", control, model.energy, control) / H_S**3 == pytest.approx(energy, rel=1e-9)
+    assert np.einsum("ia,ij,ja", control, model.effort, control) / H_S**3 == pytest.approx(energy, rel=1e-9)
     samples = (np.arange(SAMPLES * segments) + 0.5) * H_S / SAMPLES
-    np.testing.assert_allclose(model.position @ control, evaluate(trajectory, samples)[0], atol=1e-12)
+    np.testing.assert_allclose(model.samples @ control, evaluate(trajectory, samples)[0], atol=1e-12)
 
 
 def test_curve_is_twice_continuously_differentiable() -> None:
-    trajectory = to_trajectory(random_control(1), H_S, 5.0, False)
+    trajectory = to_trajectory(power_matrix(3), random_control(1), H_S, 5.0, False)
     inner = trajectory.breaks_s[1:-1]
     for before, after in zip(
         evaluate(trajectory, inner - 1e-9), evaluate(trajectory, inner + 1e-9), strict=True
@@ -53,7 +52,7 @@ def test_pinned_ends_are_the_states() -> None:
     control = random_control(2)
     start, end = random_control(3, 3), random_control(4, 3)
     pin_ends(control, H_S, start, end)
-    trajectory = to_trajectory(control, H_S, 0.0, False)
+    trajectory = to_trajectory(power_matrix(3), control, H_S, 0.0, False)
     ends = np.array([trajectory.start_s, trajectory.end_s])
     for order, values in enumerate(evaluate(trajectory, ends)):
         np.testing.assert_allclose(values, [start[order], end[order]], atol=1e-12)
@@ -62,7 +61,7 @@ def test_pinned_ends_are_the_states() -> None:
 @pytest.mark.parametrize("seed", range(5))
 def test_peaks_bound_the_curve_tightly(seed: int) -> None:
     control = random_control(seed)
-    trajectory = to_trajectory(control, H_S, 0.0, False)
+    trajectory = to_trajectory(power_matrix(3), control, H_S, 0.0, False)
     times = np.linspace(trajectory.start_s, trajectory.end_s, 20_001)
     _, velocity, acceleration = evaluate(trajectory, times)
     fastest = np.linalg.norm(velocity, axis=1).max()
@@ -74,15 +73,15 @@ def test_peaks_bound_the_curve_tightly(seed: int) -> None:
 
 def test_sampled_points_are_on_the_curve() -> None:
     control = random_control(6)
-    trajectory = to_trajectory(control, H_S, 0.0, False)
+    trajectory = to_trajectory(power_matrix(3), control, H_S, 0.0, False)
     times = np.linspace(trajectory.start_s, trajectory.end_s, 5 * 9 + 1)
     np.testing.assert_allclose(sample_spline(control, 5), evaluate(trajectory, times)[0], atol=1e-12)
 
 
 def test_joined_trajectories_follow_each_other() -> None:
     first, second = (
-        to_trajectory(random_control(7), H_S, 0.0, True),
-        to_trajectory(random_control(8), 0.3, 3.6, False),
+        to_trajectory(power_matrix(3), random_control(7), H_S, 0.0, True),
+        to_trajectory(power_matrix(3), random_control(8), 0.3, 3.6, False),
     )
     both = join(first, second)
     times = np.linspace(0.0, second.end_s, 200)
