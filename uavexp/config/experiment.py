@@ -123,10 +123,17 @@ def _load(name: str, file: Path) -> dict[Any, Any]:
     return tree if isinstance(tree, dict) else {}
 
 
+def _other(name: str, file: Path) -> Experiment:
+    """Another experiment, from the same folder or else from those shipped."""
+    own = file.parent.parent / f"{name}.yaml"
+    shipped = experiments_folder() / f"{name}.yaml"
+    return read_experiment(name, own if own.is_file() else shipped, borrow=False)
+
+
 def _listed(name: str, file: Path, key: str, items: Any) -> Sequence[Any]:
     """Tables, figures or claims, or those of another experiment."""
     if isinstance(items, str):
-        other = read_experiment(items, file.parent.parent / f"{items}.yaml", borrow=False).report
+        other = _other(items, file).report
         return other.get(key, [])
     if not isinstance(items, list):
         raise ConfigError(f"experiments={name}: {key} must be a list, got {items!r}")
@@ -135,7 +142,7 @@ def _listed(name: str, file: Path, key: str, items: Any) -> Sequence[Any]:
 
 def _borrowed(name: str, file: Path, axis: str, other: str) -> Mapping[str, tuple[Setting, ...]]:
     """Entries of the same axis in another experiment, which must have its own."""
-    axes = read_experiment(other, file.parent.parent / f"{other}.yaml", borrow=False).axes
+    axes = _other(other, file).axes
     if axis not in axes:
         raise ConfigError(f"experiments={name}: axes.{axis}: {other} has no axis {axis}")
     return axes[axis]

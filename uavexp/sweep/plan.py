@@ -44,9 +44,14 @@ def plan_of(
 
     Raises:
         RecordError: the folder holds another study, or trials of another version.
+        ConfigError: the experiment names a table, figure, judge or metric that does not exist.
     """
     identities = [identity(cell) for cell in command.cells]
     study = _study(command, folder, identities)
+    if command.experiment is not None:
+        from uavexp.report.declared import declared  # pandas and matplotlib, needed by no other command
+
+        declared(study)  # a report that cannot be made is refused before the first flight
     if (folder / STUDY).exists():
         study = _joined(read_study(folder), study, command, user_folder)
     return Plan(

@@ -161,6 +161,8 @@ def test_a_report_is_a_list_or_that_of_another_experiment(tmp_path: Path) -> Non
         "tables": ["by_arm"],
         "figures": ["success"],
     }
+    (folder / "shipped.yaml").write_text(f"figures: mcr/table1\n{axes}")
+    assert "attribution" in str(read_experiment("own/shipped", folder / "shipped.yaml").report["figures"])
     (folder / "bad.yaml").write_text(f"claims: {{says: this}}\n{axes}")
     with pytest.raises(ConfigError, match="claims must be a list"):
         read_experiment("own/bad", folder / "bad.yaml")

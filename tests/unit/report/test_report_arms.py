@@ -10,9 +10,7 @@ import pandas as pd
 import pytest
 
 from tests.studies import made_up
-from uavexp.errors import ConfigError
 from uavexp.report.contents import Report
-from uavexp.report.declared import declared
 from uavexp.report.judges import Verdict
 from uavexp.report.make import make_report
 from uavexp.store.study import Study
@@ -102,57 +100,6 @@ def test_a_claim_about_an_arm_that_was_not_flown_is_not_testable(tmp_path: Path)
         settings={"primary": "new", "metrics": ["plan_length_m"]},
     )
     assert {claim.verdict for claim in Report(study=part).judgements} == {Verdict.NOT_TESTABLE}
-
-
-@pytest.mark.parametrize(
-    ("changes", "says"),
-    [
-        ({"tables": ["by_metrc"]}, r"no such one: by_metrc \(did you mean 'by_metric'\?\); there are by_arm"),
-        ({"tables": [{"by_metric": {"metrics": ["plan_lenght_m"]}}]}, "did you mean 'plan_length_m'"),
-        ({"tables": [{"by_arm": {"fornt": True}}]}, "no option fornt.*did you mean 'front'"),
-        ({"tables": ["levels"]}, "levels: needs arm, undisturbed"),
-        ({"figures": ["os.path"]}, "os.path is refused"),
-        ({"figures": ["uavexp.report.style"]}, "has no function figure"),
-        ({"figures": [{"success": {}, "contacts": {}}]}, "each is NAME"),
-        ({"claims": [{"says": "no source"}]}, "each needs says, source"),
-        ({"claims": [{"says": "x", "source": "y", "judge": "worse"}]}, "no such judge: worse"),
-        ({"claims": [{"says": "x", "source": "y", "metric": "success"}]}, "needs arms"),
-    ],
-)
-def test_what_does_not_exist_is_named_with_what_does(
-    tmp_path: Path, changes: dict[str, Any], says: str
-) -> None:
-    with pytest.raises(ConfigError, match=says):
-        declared(study_of(tmp_path / "study", **changes))
-
-
-def test_a_table_and_a_figure_may_stay_in_ones_own_package(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "mine").mkdir()
-    (tmp_path / "mine" / "__init__.py").write_text("")
-    (tmp_path / "mine" / "widths.py").write_text(OWN)
-    monkeypatch.syspath_prepend(tmp_path)
-    study = study_of(tmp_path / "study", tables=[{"mine.widths": {"of": "arms"}}], figures=["mine.widths"])
-    with pytest.raises(ConfigError, match="UAVEXP_TRUST"):
-        declared(study)
-    monkeypatch.setenv("UAVEXP_TRUST", "mine")
-    (table,) = Report(study=study).tables
-    (drawing,) = Report(study=study).drawings()
-    assert (table.name, table.rows) == ("widths", (("2 arms",),))
-    assert drawing.name == "widths"
-
-
-OWN = """
-from uavexp.report.figures.base import Drawing, new_figure
-from uavexp.report.tables.base import Table
-
-def table(results, *, name, of):
-    return Table(name=name, title="Widths", columns=("n",), rows=((f"{len(results.arms)} {of}",),))
-
-def figure(results, *, name):
-    return Drawing(name=name, caption=results.notes[0], figure=new_figure(3.5, 2.0))
-"""
 
 
 def test_the_whole_report_is_written(tmp_path: Path) -> None:
