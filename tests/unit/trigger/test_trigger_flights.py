@@ -38,7 +38,7 @@ def flown(trigger: str, **more: Any) -> TrialLog:
         }
         | more
     )
-    return replace(trial.log, body_radius_m=LIMITS.body_radius_m)
+    return changed(trial.log, body_radius_m=LIMITS.body_radius_m)
 
 
 @pytest.mark.parametrize("trigger", REPLANNING)
