@@ -75,7 +75,7 @@ def fly_cell(cell: Cell, seed: int, progress: Progress | None = None) -> Trial:
     Raises:
         UavexpError: something the user can mend (the world cannot be made, no such device).
     """
-    from uavexp.metrics import evaluate
+    from uavexp.metrics.evaluate import evaluate
     from uavexp.trial import fly_trial
 
     world, log = fly_trial(build(cell.config), seed, progress)

@@ -15,7 +15,7 @@ from uavexp.paths import PACKAGE
 LAYERS = (
     {"arrays", "errors", "kernel_cache"},
     {"field", "trajectory", "seeding", "paths", "geometry", "o3d"},
-    {"types", "log", "parameters"},
+    {"types", "log", "causes", "parameters"},
     {"braking", "flatness", "triangle_grid", "bodies", "scene"},
     {"cloud"},
     {"roles", "metrics", "inspection"},

@@ -17,7 +17,7 @@ import pytest
 import uavexp
 from uavexp.__main__ import main
 from uavexp.errors import ConfigError
-from uavexp.metrics import evaluate
+from uavexp.metrics.evaluate import evaluate
 from uavexp.paths import PACKAGE, conf_folder
 from uavexp.store.logs import read_log
 from uavexp.store.records import read_record

@@ -9,6 +9,7 @@ import numpy as np
 from uavexp.arrays import Bool, Float
 from uavexp.geometry import polyline_length_m
 from uavexp.log import TrialLog
+from uavexp.metrics.metric import Metric, Metrics
 from uavexp.types import Outcome, World
 
 
@@ -57,8 +58,11 @@ def tour_length_m(log: TrialLog, world: World) -> float:
 
 
 def scene_kind(log: TrialLog, world: World) -> str:
-    """What the reference map does not show: static (nothing), blocks, people, both; empty without a map."""
-    if world.reference is None:
+    """What the reference map does not show: static (nothing), blocks, people, both.
+
+    Empty without a map, or where nothing was to be seen.
+    """
+    if world.reference is None or not log.inspection.cell_m.size:
         return ""
     known, true = world.reference.triangles, world.triangles
     people, blocks = log.movers.shape.size > 0, not np.array_equal(known, true)
@@ -67,21 +71,47 @@ def scene_kind(log: TrialLog, world: World) -> str:
     )
 
 
-def measures(log: TrialLog, world: World) -> dict[str, int | float | str]:
-    """All of them, as columns; of a flight without cells NaN, 0 and empty."""
-    visited = int(np.isfinite(log.inspection.viewpoint_visited_s).sum())
-    return {
-        "coverage": coverage(log),
-        "coverage_visible": coverage_visible(log),
-        "coverage_truth": coverage_truth(log),
-        "viewpoints": len(log.inspection.viewpoint_visited_s),
-        "visited": visited,
-        "unreachable": unreachable(log),
-        "segment_switches": segment_switches(log),
-        "tour_length_m": tour_length_m(log, world),
-        "scene_kind": scene_kind(log, world) if log.inspection.cell_m.size else "",
-    }
-
-
 def _share(seen: Bool) -> float:
     return float(seen.mean()) if seen.size else math.nan
+
+
+def _share_of_cells(column: str, title: str) -> Metric:
+    return Metric(
+        column=column, title=title, unit="%", better=1, scale=100.0, missing="nothing was to be seen"
+    )
+
+
+METRICS: Metrics = {
+    _share_of_cells("coverage", "Coverage of all targets"): lambda flight: coverage(flight.log),
+    _share_of_cells("coverage_visible", "Coverage of the visible"): lambda flight: coverage_visible(
+        flight.log
+    ),
+    _share_of_cells("coverage_truth", "Coverage of the true surface"): lambda flight: coverage_truth(
+        flight.log
+    ),
+    Metric(column="viewpoints", title="Viewpoints", digits=1, is_count=True): (
+        lambda flight: len(flight.log.inspection.viewpoint_visited_s)
+    ),
+    Metric(column="visited", title="Viewpoints visited", digits=1, is_count=True): (
+        lambda flight: int(np.isfinite(flight.log.inspection.viewpoint_visited_s).sum())
+    ),
+    Metric(
+        column="unreachable",
+        title="Viewpoints not reached",
+        better=-1,
+        is_count=True,
+        missing="time was up before all were tried",
+    ): lambda flight: unreachable(flight.log),
+    Metric(column="segment_switches", title="Segment switches", digits=1, better=-1, is_count=True): (
+        lambda flight: segment_switches(flight.log)
+    ),
+    Metric(
+        column="tour_length_m",
+        title="Tour as planned, straight",
+        unit="m",
+        digits=1,
+        better=-1,
+        missing="no viewpoint was planned",
+    ): lambda flight: tour_length_m(flight.log, flight.world),
+    Metric(column="scene_kind"): lambda flight: scene_kind(flight.log, flight.world),
+}

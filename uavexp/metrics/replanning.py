@@ -9,17 +9,24 @@ end is neither.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
+from uavexp import causes
 from uavexp.log import Replan, TrialLog
+from uavexp.metrics import path
+from uavexp.metrics.metric import Measure, Metric, Metrics
 from uavexp.types import PlanStatus
 
-# counted by name; every other cause ("retry", "brake") is "other"
-CAUSES = ("map", "goal", "clock", "distance", "collision", "covered", "expired", "arrival", "risk")
+_COUNT = "replans_"  # and the cause
+_NOT_MEASURED = "the log does not tell"
+
+
+COUNTED = (*(cause.name for cause in causes.POLICY), causes.OTHER)
 
 
 def executed(log: TrialLog) -> tuple[Replan, ...]:
@@ -35,11 +42,13 @@ def failed(log: TrialLog) -> tuple[Replan, ...]:
 
 
 def count_by_cause(replans: Sequence[Replan]) -> dict[str, int]:
-    """Replans per cause, under its name or `other`."""
-    counts = dict.fromkeys((*CAUSES, "other"), 0)
-    for replan in replans:
-        counts[replan.cause if replan.cause in CAUSES else "other"] += 1
-    return counts
+    """Replans per cause: every shipped policy's, also where none occurred, and whatever else did.
+
+    The pilot's own count together, as `other`.
+    """
+    pilots = {cause.name for cause in causes.PILOT}
+    counted = Counter(causes.OTHER if replan.cause in pilots else replan.cause for replan in replans)
+    return {name: counted[name] for name in (*COUNTED, *(set(counted) - set(COUNTED)))}
 
 
 def count_useful(replans: Sequence[Replan], useful_change_m: float) -> int:
@@ -122,27 +131,113 @@ def _delay(time_s: float, episodes: Sequence[Blocked]) -> Delay:
     return Delay(since_s, time_s - since_s)
 
 
-def blocked_delays(log: TrialLog) -> dict[str, int | float]:
-    """How fast blocked trajectories were answered; all NaN for a log that did not measure it.
+@dataclass(frozen=True, slots=True)
+class Answers:
+    """How fast blocked trajectories were answered.
 
-    Returns:
-        `blocked_episodes`, their number; `blocked_delay_s`, mean time from the first update of
-        an answered one to its answer (0: in the same update; NaN: none was answered);
-        `blocked_unanswered`, those that a contact or the flight's end closed before any
-        request; `blocked_cleared`, those that ended by themselves: the map changed back, the
-        place was passed without contact, or the safety role stopped the vehicle.
-        The delay leaves out unanswered episodes: read it beside their number.
+    The delay leaves out unanswered episodes: read it beside their number.
     """
-    if math.isnan(log.limits.body_radius_m):
-        names = ("blocked_episodes", "blocked_delay_s", "blocked_unanswered", "blocked_cleared")
-        return dict.fromkeys(names, math.nan)
+
+    episodes: int
+    delay_s: float  # mean from the first update of an answered one to its answer; NaN: none was answered
+    unanswered: int  # closed by a contact or the flight's end before any request
+    # ended by themselves: the map changed back, the place was passed without contact, or the
+    # safety role stopped the vehicle
+    cleared: int
+
+
+def answers(log: TrialLog) -> Answers:
+    """What became of the blocked episodes of a flight."""
     episodes = blocked_episodes(log)
     delays_s = [item.answer_s - item.first_s for item in episodes if not math.isnan(item.answer_s)]
     silent = [item for item in episodes if math.isnan(item.answer_s)]
     unanswered = sum(item.contact or math.isinf(item.until_s) for item in silent)
-    return {
-        "blocked_episodes": len(episodes),
-        "blocked_delay_s": sum(delays_s) / len(delays_s) if delays_s else math.nan,
-        "blocked_unanswered": unanswered,
-        "blocked_cleared": len(silent) - unanswered,
-    }
+    return Answers(
+        episodes=len(episodes),
+        delay_s=sum(delays_s) / len(delays_s) if delays_s else math.nan,
+        unanswered=unanswered,
+        cleared=len(silent) - unanswered,
+    )
+
+
+def _of_replans(figure: Callable[[Sequence[Replan]], int | float]) -> Measure:
+    return lambda flight: figure(executed(flight.log))
+
+
+def _count_of(cause: str) -> Measure:
+    return _of_replans(lambda replans: count_by_cause(replans)[cause])
+
+
+def cause_metric(cause: str) -> Metric:
+    """The column of the replans of one cause."""
+    return Metric(column=f"{_COUNT}{cause}", title=f"Replans, cause {cause}", digits=1, is_count=True)
+
+
+def _of_blocked(figure: Callable[[Answers], int | float]) -> Measure:
+    """A figure of the blocked episodes; NaN for a log that did not measure them."""
+    return lambda flight: (
+        math.nan if math.isnan(flight.log.limits.body_radius_m) else figure(answers(flight.log))
+    )
+
+
+def own_causes(log: TrialLog) -> dict[str, int]:
+    """Counts of the causes that occurred and that no shipped policy gives, by column."""
+    counts = count_by_cause(executed(log))
+    return {cause_metric(cause).column: count for cause, count in counts.items() if cause not in COUNTED}
+
+
+METRICS: Metrics = {
+    Metric(column="replans", title="Replans, RF", digits=1, better=-1, is_count=True): _of_replans(len),
+    **{cause_metric(cause): _count_of(cause) for cause in COUNTED},
+    Metric(column="useful_replans", title="Useful replans", digits=1, better=1, is_count=True): (
+        lambda flight: count_useful(executed(flight.log), flight.useful_change_m)
+    ),
+    Metric(column="failed_plans", title="Requests without a plan", better=-1, is_count=True): (
+        lambda flight: len(failed(flight.log))
+    ),
+    Metric(column="dropped_triggers", title="Triggers dropped while planning", is_count=True): (
+        lambda flight: flight.log.dropped_triggers
+    ),
+    Metric(column="replans_per_m", title="Replans per metre", unit="1/m", missing="nothing was flown"): (
+        lambda flight: rate(len(executed(flight.log)), path.path_length_m(flight.log))
+    ),
+    Metric(column="replans_per_s", title="Replans per second", unit="1/s", missing="nothing was flown"): (
+        lambda flight: rate(len(executed(flight.log)), path.completion_time_s(flight.log))
+    ),
+    Metric(
+        column="replans_near_change_share",
+        title="Replans near a map change",
+        unit="%",
+        digits=0,
+        better=1,
+        scale=100.0,
+        missing="there was no replan",
+    ): _of_replans(share_near_change),
+    Metric(
+        column="blocked_episodes",
+        title="Times the path was blocked",
+        is_count=True,
+        missing=_NOT_MEASURED,
+    ): _of_blocked(lambda found: found.episodes),
+    Metric(
+        column="blocked_delay_s",
+        title="Delay from blocked path to request",
+        unit="s",
+        digits=3,
+        better=-1,
+        missing=f"none was answered, or {_NOT_MEASURED}",
+    ): _of_blocked(lambda found: found.delay_s),
+    Metric(
+        column="blocked_unanswered",
+        title="Blocked paths without an answer",
+        better=-1,
+        is_count=True,
+        missing=_NOT_MEASURED,
+    ): _of_blocked(lambda found: found.unanswered),
+    Metric(
+        column="blocked_cleared",
+        title="Blocked paths that cleared by themselves",
+        is_count=True,
+        missing=_NOT_MEASURED,
+    ): _of_blocked(lambda found: found.cleared),
+}

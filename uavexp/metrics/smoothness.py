@@ -14,6 +14,8 @@ from __future__ import annotations
 import numpy as np
 
 from uavexp.arrays import Float
+from uavexp.log import TrialLog
+from uavexp.metrics.metric import Metric, Metrics
 
 WINDOW_S = 0.25  # short against a manoeuvre (about 1 s), long against a control step (0.01 s)
 DEGREE = 3
@@ -64,3 +66,39 @@ def squared_integral(values: Float, step_s: float) -> float:
     if values.shape[0] == 0:
         return float("nan")
     return float(np.trapezoid(np.sum(values**2, axis=1), dx=step_s))
+
+
+def _integral(log: TrialLog, order: int) -> float:
+    """∫‖x‖² dt of the first or second derivative of the flown velocity."""
+    return squared_integral(derivative(log.steps.velocity_mps, log.step_s, order), log.step_s)
+
+
+METRICS: Metrics = {
+    Metric(
+        column="acceleration_integral_m2ps3",
+        title="Smoothness, ∫‖acceleration‖²",
+        unit="m²/s³",
+        digits=1,
+        better=-1,
+        needs_arrival=True,
+        missing="the flight had fewer than five rows",
+    ): lambda flight: _integral(flight.log, 1),
+    Metric(
+        column="jerk_integral_m2ps5",
+        title="Smoothness, ∫‖jerk‖²",
+        unit="m²/s⁵",
+        digits=0,
+        better=-1,
+        needs_arrival=True,
+        missing="the flight had fewer than five rows",
+    ): lambda flight: _integral(flight.log, 2),
+    Metric(
+        column="reference_acceleration_integral_m2ps3",
+        title="∫‖acceleration of the reference‖²",
+        unit="m²/s³",
+        digits=1,
+        better=-1,
+        needs_arrival=True,
+        missing="the flight never began",
+    ): lambda flight: squared_integral(flight.log.steps.reference_acceleration_mps2, flight.log.step_s),
+}

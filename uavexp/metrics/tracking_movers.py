@@ -8,14 +8,16 @@ least total distance. A track is taken to be of the ESDF update that it was logg
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from uavexp.arrays import Float, Int
 from uavexp.bodies import present
 from uavexp.log import Contact, TrialLog
+from uavexp.metrics.metric import Flight, Measure, Metric, Metrics
 
 HORIZONS_S = (0.3, 0.6, 0.9, 1.2)
 MEAN_HORIZONS_S = tuple(0.1 * step for step in range(1, 13))  # the mean is taken over these
@@ -35,27 +37,7 @@ class TrackQuality:
     identity_switches: int  # matches of a mover to another track than its last
 
 
-def measures(log: TrialLog, near_miss_m: float) -> dict[str, bool | int | float | str]:
-    """What `summary` reports of a flight with movers; nothing at all without."""
-    if not log.movers.clearance_m.size:
-        return {}
-    tracks = quality(log)
-    at = zip(HORIZONS_S, tracks.prediction_error_m, strict=True)
-    return {
-        "mover_contacts": sum(contact.mover >= 0 for contact in log.contacts),
-        "min_mover_clearance_m": _nearest_m(log),
-        "near_miss_distance_m": near_miss_m,
-        "near_misses": near_misses(log.steps.time_s, log.movers.clearance_m, log.contacts, near_miss_m),
-        "track_error_m": tracks.position_error_m,
-        **{f"prediction_error_{horizon_s:g}s_m": error_m for horizon_s, error_m in at},
-        "prediction_error_mean_m": tracks.mean_prediction_error_m,
-        "missed_track_share": tracks.missed_share,
-        "false_track_share": tracks.false_share,
-        "identity_switches": tracks.identity_switches,
-    }
-
-
-def _nearest_m(log: TrialLog) -> float:
+def nearest_m(log: TrialLog) -> float:
     """Least distance to a mover; NaN when none was ever there."""
     least_m = float(log.movers.clearance_m.min())
     return least_m if math.isfinite(least_m) else math.nan
@@ -193,3 +175,91 @@ def near_miss_spans(
 
 def _mean(values: Float) -> float:
     return float(values.mean()) if values.size else math.nan
+
+
+@lru_cache(maxsize=1)
+def _quality(flight: Flight) -> TrackQuality:
+    return quality(flight.log)
+
+
+def _among_movers(measure: Measure) -> Measure:
+    """The measure of a flight with movers; no column without."""
+    return lambda flight: measure(flight) if flight.log.movers.clearance_m.size else None
+
+
+def _of_tracks(figure: Callable[[TrackQuality], float]) -> Measure:
+    return _among_movers(lambda flight: figure(_quality(flight)))
+
+
+def _prediction_error(horizon: int) -> Measure:
+    return _of_tracks(lambda tracks: tracks.prediction_error_m[horizon])
+
+
+METRICS: Metrics = {
+    Metric(column="mover_contacts", title="Contacts with movers", better=-1, is_count=True): _among_movers(
+        lambda flight: sum(contact.mover >= 0 for contact in flight.log.contacts)
+    ),
+    Metric(
+        column="min_mover_clearance_m",
+        title="Min. distance to a mover",
+        unit="m",
+        better=1,
+        missing="none was ever there",
+    ): _among_movers(lambda flight: nearest_m(flight.log)),
+    Metric(column="near_miss_distance_m", title="Distance of a near miss", unit="m"): _among_movers(
+        lambda flight: flight.near_miss_m
+    ),
+    Metric(column="near_misses", title="Near misses of movers", better=-1, is_count=True): _among_movers(
+        lambda flight: near_misses(
+            flight.log.steps.time_s, flight.log.movers.clearance_m, flight.log.contacts, flight.near_miss_m
+        )
+    ),
+    Metric(
+        column="track_error_m",
+        title="Position error of tracks",
+        unit="m",
+        digits=3,
+        better=-1,
+        missing="no track matched a mover",
+    ): _of_tracks(lambda tracks: tracks.position_error_m),
+    **{
+        Metric(
+            column=f"prediction_error_{ahead_s:g}s_m",
+            title=f"Prediction error after {ahead_s:g} s",
+            unit="m",
+            digits=3,
+            better=-1,
+            missing="no track matched a mover so long before the end",
+        ): _prediction_error(n)
+        for n, ahead_s in enumerate(HORIZONS_S)
+    },
+    Metric(
+        column="prediction_error_mean_m",
+        title=f"Prediction error, mean over {MEAN_HORIZONS_S[-1]:g} s",
+        unit="m",
+        digits=3,
+        better=-1,
+        missing="no track matched a mover so long before the end",
+    ): _of_tracks(lambda tracks: tracks.mean_prediction_error_m),
+    Metric(
+        column="missed_track_share",
+        title=f"Movers within {WITHIN_M:g} m not tracked",
+        unit="%",
+        digits=1,
+        better=-1,
+        scale=100.0,
+        missing="no mover came so near",
+    ): _of_tracks(lambda tracks: tracks.missed_share),
+    Metric(
+        column="false_track_share",
+        title="False tracks",
+        unit="%",
+        digits=1,
+        better=-1,
+        scale=100.0,
+        missing="there was no track",
+    ): _of_tracks(lambda tracks: tracks.false_share),
+    Metric(column="identity_switches", title="Identity switches", better=-1, is_count=True): _of_tracks(
+        lambda tracks: tracks.identity_switches
+    ),
+}

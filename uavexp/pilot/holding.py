@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from uavexp import causes
 from uavexp.arrays import Float
 from uavexp.braking import braking_trajectory, with_stop
 from uavexp.errors import require, require_non_negative
@@ -118,9 +119,9 @@ class HoldingPilot:
         if observation.time_s < self.rules.settle_s - 1e-9:
             return
         if self.trajectory is None and not self.replans:
-            self.request(Decision(replan=True, cause="first"), observation)
+            self.request(Decision(replan=True, cause=causes.FIRST.name), observation)
         elif self.failure and not (self._wait_for_rest and self._moving(observation.time_s)):
-            cause = "brake" if self._wait_for_rest else "retry"
+            cause = (causes.BRAKE if self._wait_for_rest else causes.RETRY).name
             self.request(Decision(replan=True, cause=cause), observation)
 
     def decide(self, observation: Observation) -> float:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import field
 
+from uavexp import causes
 from uavexp.field import DistanceField
 from uavexp.parameters import Positive, option
 from uavexp.trajectory import Trajectory
@@ -42,6 +43,6 @@ class CollisionCheck:
             return Decision(replan=False)
         ahead_m = clearance_ahead_m(trajectory, observation.field, now_s, self.horizon_s)
         if comes_near(ahead_m, self.clearance_m):
-            return Decision(replan=True, cause="collision")
+            return Decision(replan=True, cause=causes.COLLISION.name)
         arrival = ends_within(trajectory, observation.goal, now_s, self.arrival_s)
-        return Decision(replan=arrival, cause="arrival" if arrival else "")
+        return Decision(replan=arrival, cause=causes.ARRIVAL.name if arrival else "")

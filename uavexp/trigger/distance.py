@@ -11,6 +11,7 @@ from dataclasses import field
 
 import numpy as np
 
+from uavexp import causes
 from uavexp.field import DistanceField
 from uavexp.geometry import polyline_length_m
 from uavexp.parameters import Positive, option
@@ -45,9 +46,9 @@ class Distance:
             return Decision(replan=False)
         score = flown_m(trajectory, now_s) / self.distance_m
         if score >= 1.0:
-            return Decision(replan=True, cause="distance", score=score)
+            return Decision(replan=True, cause=causes.DISTANCE.name, score=score)
         arrival = ends_within(trajectory, observation.goal, now_s, self.arrival_s)
-        return Decision(replan=arrival, cause="arrival" if arrival else "", score=score)
+        return Decision(replan=arrival, cause=causes.ARRIVAL.name if arrival else "", score=score)
 
 
 def flown_m(trajectory: Trajectory, now_s: float) -> float:

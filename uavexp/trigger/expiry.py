@@ -10,6 +10,7 @@ from dataclasses import field
 
 import numpy as np
 
+from uavexp import causes
 from uavexp.field import DistanceField
 from uavexp.parameters import NonNegative, Positive, option
 from uavexp.trajectory import Trajectory
@@ -50,12 +51,12 @@ class Expiry:
         now_s = observation.time_s
         ahead_m = clearance_ahead_m(trajectory, observation.field, now_s, self.horizon_s)
         if comes_near(ahead_m, self.clearance_m):
-            return "collision"
+            return causes.COLLISION.name
         if self.goal_updated and _is_another_goal(observation):
-            return "goal"
+            return causes.GOAL.name
         if is_older(trajectory, now_s, self.expiry_s):
-            return "expired"
-        return "arrival" if ends_within(trajectory, observation.goal, now_s, self.arrival_s) else ""
+            return causes.EXPIRED.name
+        return causes.ARRIVAL.name if ends_within(trajectory, observation.goal, now_s, self.arrival_s) else ""
 
 
 def _is_another_goal(observation: Observation) -> bool:

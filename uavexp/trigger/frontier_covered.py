@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from dataclasses import field
 
+from uavexp import causes
 from uavexp.field import DistanceField
 from uavexp.parameters import NonNegative, Positive, PositiveShare, option
 from uavexp.trajectory import Trajectory
@@ -69,13 +70,13 @@ class FrontierCovered:
         now_s = observation.time_s
         ahead_m = clearance_ahead_m(trajectory, observation.field, now_s, self.horizon_s)
         if comes_near(ahead_m, self.clearance_m):
-            return "collision"
+            return causes.COLLISION.name
         if ends_within(trajectory, observation.goal, now_s, self.arrival_s):
-            return "arrival"
+            return causes.ARRIVAL.name
         if score > 1.0 and is_older(trajectory, now_s, self.min_age_s):
-            return "covered"
+            return causes.COVERED.name
         aged = self.period_s > 0.0 and is_older(trajectory, now_s, self.period_s)
-        return "clock" if aged else ""
+        return causes.CLOCK.name if aged else ""
 
     def _covered_share(self, observation: Observation) -> float:
         """Share of what was unknown around the frontier at the plan that has been seen since."""

@@ -24,6 +24,7 @@ from enum import StrEnum
 
 import numpy as np
 
+from uavexp import causes
 from uavexp.arrays import Float, Int32
 from uavexp.errors import require
 from uavexp.field import DistanceField
@@ -144,7 +145,7 @@ class Mcr:
         )
         if decision.replan or goal_drift_m <= self.delta_goal_m:
             return decision
-        return Decision(replan=True, cause="goal", score=goal_drift_m / self.delta_goal_m)
+        return Decision(replan=True, cause=causes.GOAL.name, score=goal_drift_m / self.delta_goal_m)
 
     def _goal_drift_m(self, observation: Observation) -> float:
         """Distance between g* now and the goal flown to (or g* at the previous check)."""
@@ -174,7 +175,7 @@ class Mcr:
         if not violated.any():
             return Decision(replan=False, score=score)
         voxel, _ = self._changed(observation, self._points_m[part][violated])
-        return Decision(replan=True, cause="map", score=score, voxel=voxel)
+        return Decision(replan=True, cause=causes.MAP.name, score=score, voxel=voxel)
 
     def _region_event(self, observation: Observation) -> Decision:
         """Equation (20) over the voxels of B(tau)."""
@@ -182,7 +183,7 @@ class Mcr:
         score = largest_m / self.delta_map_m
         if len(voxel) < self.min_changed_voxels:
             return Decision(replan=False, score=score)
-        return Decision(replan=True, cause="map", score=score, voxel=voxel)
+        return Decision(replan=True, cause=causes.MAP.name, score=score, voxel=voxel)
 
     def _changed(self, observation: Observation, points_m: Float) -> tuple[Int32, float]:
         """Voxels within r_mon of the points that changed by more than delta_map, and the largest change."""

@@ -37,6 +37,7 @@ from enum import StrEnum
 import numba as nb
 import numpy as np
 
+from uavexp import causes
 from uavexp.arrays import Float
 from uavexp.field import DistanceField
 from uavexp.parameters import NonNegative, Positive, option
@@ -147,7 +148,7 @@ class Risk:
         if score <= 1.0 or now_s - self._fired_s < self.min_interval_s - _TIME_S:
             return Decision(replan=False, score=score)
         self._fired_s = now_s
-        return Decision(replan=True, cause="risk", score=score)
+        return Decision(replan=True, cause=causes.RISK.name, score=score)
 
     def score(self, observation: Observation) -> float:
         """Largest d_safe over d_min of any mover, distances taken from its surface; more than 1 fires.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import field
 
+from uavexp import causes
 from uavexp.errors import require
 from uavexp.field import DistanceField
 from uavexp.parameters import Positive, option
@@ -37,4 +38,4 @@ class Tbr:
         if ticks <= self._ticks:
             return Decision(replan=False)
         self._ticks = ticks
-        return Decision(replan=True, cause="clock", score=1.0)
+        return Decision(replan=True, cause=causes.CLOCK.name, score=1.0)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.logs import changed, make_log
+from tests.logs import changed, make_log, make_world
 from uavexp.arrays import Float
 from uavexp.bodies import ABSENT_M
 from uavexp.check.fields import empty, field_from
@@ -15,7 +15,8 @@ from uavexp.detection.clusters import Clusters
 from uavexp.detection.kalman import Estimate, Motion, MotionFilter, estimated
 from uavexp.detection.tracker import Tracker, TrackRule, centres_m
 from uavexp.log import Contact, TrialLog
-from uavexp.metrics.tracking_movers import match, measures, near_misses, predicted_errors_m, quality
+from uavexp.metrics.metric import Flight, measured
+from uavexp.metrics.tracking_movers import METRICS, match, near_misses, predicted_errors_m, quality
 from uavexp.types import RayScan, Shape
 
 
@@ -315,8 +316,9 @@ def test_near_misses_are_episodes_without_a_contact() -> None:
 
 
 def test_flights_without_movers_have_no_such_columns() -> None:
-    assert measures(make_log(still, still), 0.5) == {}
-    told = measures(log_with([(3, np.zeros(3), AHEAD)]), 0.5)
+    world = make_world([])
+    assert measured(METRICS, Flight(log=make_log(still, still), world=world)) == {}
+    told = measured(METRICS, Flight(log=log_with([(3, np.zeros(3), AHEAD)]), world=world))
     assert told["mover_contacts"] == 0
     assert told["near_miss_distance_m"] == 0.5
     assert told["prediction_error_1.2s_m"] == pytest.approx(0.0, abs=1e-6)

@@ -15,6 +15,7 @@ from uavexp.inspection.reference_surface import Surface, reference_field
 from uavexp.inspection.visibility import Camera
 from uavexp.log import TrialLog
 from uavexp.metrics import coverage as figures
+from uavexp.metrics.metric import Flight, measured
 from uavexp.mission.coverage import Coverage, is_met, reachable_m, visible_anywhere
 from uavexp.scene import Scene
 from uavexp.types import Bodies, Outcome, Shape, World
@@ -131,7 +132,7 @@ def inspected(outcome: Outcome = Outcome.INSPECTED) -> tuple[TrialLog, World]:
 
 def test_figures_of_an_inspection() -> None:
     log, world = inspected()
-    assert figures.measures(log, world) == {
+    assert measured(figures.METRICS, Flight(log=log, world=world)) == {
         "coverage": 0.6,
         "coverage_visible": 0.75,
         "coverage_truth": 0.5,
@@ -153,7 +154,7 @@ def test_a_flight_that_ran_out_of_time_knows_nothing_unreachable() -> None:
 
 def test_other_missions_have_no_coverage() -> None:
     log = make_log(lambda t: np.zeros((len(t), 3)), lambda t: np.zeros((len(t), 3)))
-    measures = figures.measures(log, make_world([]))
+    measures = measured(figures.METRICS, Flight(log=log, world=make_world([])))
     assert math.isnan(measures["coverage"])
     assert math.isnan(measures["coverage_visible"])
     assert measures["viewpoints"] == 0

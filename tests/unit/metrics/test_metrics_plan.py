@@ -8,8 +8,15 @@ import numpy as np
 import pytest
 
 from tests.logs import changed, make_log, make_world, still_curve
-from uavexp.metrics import evaluate
-from uavexp.metrics.plan import measures, stretches
+from uavexp.log import TrialLog
+from uavexp.metrics.evaluate import evaluate
+from uavexp.metrics.metric import Flight, Values, measured
+from uavexp.metrics.plan import METRICS, stretches
+from uavexp.types import World
+
+
+def figures(log: TrialLog, world: World) -> Values:
+    return measured(METRICS, Flight(log=log, world=world))
 
 
 def planned(coefficients: list[list[list[float]]], breaks_s: list[float], **limits: float):
@@ -29,7 +36,7 @@ def cubic(**limits: float):
 
 
 def test_a_cubic_has_the_speed_acceleration_and_length_of_its_formula() -> None:
-    values = measures(cubic(), make_world([]))
+    values = figures(cubic(), make_world([]))
     assert values["plan_max_speed_mps"] == pytest.approx(8.0)
     assert values["plan_max_acceleration_mps2"] == pytest.approx(4.0)
     assert values["plan_length_m"] == pytest.approx(64 / 6, rel=1e-9)
@@ -48,7 +55,7 @@ def test_a_cubic_has_the_speed_acceleration_and_length_of_its_formula() -> None:
     ],
 )
 def test_limits_count_once_for_each_stretch_beyond_them(limits: dict[str, float], count: int) -> None:
-    assert measures(cubic(**limits), make_world([]))["limit_violations"] == count
+    assert figures(cubic(**limits), make_world([]))["limit_violations"] == count
 
 
 def test_speeding_twice_with_a_slow_stretch_between_is_two_violations() -> None:
@@ -56,15 +63,15 @@ def test_speeding_twice_with_a_slow_stretch_between_is_two_violations() -> None:
     starts = np.concatenate([[0.0], np.cumsum(speeds)])
     pieces = [[[x, 6.0, 1.2], [v, 0.0, 0.0]] for x, v in zip(starts, speeds, strict=False)]
     log = planned(pieces, [0.0, 1.0, 2.0, 3.0], max_speed_mps=2.0)
-    assert measures(log, make_world([]))["limit_violations"] == 2
+    assert figures(log, make_world([]))["limit_violations"] == 2
 
 
 def test_a_plan_through_a_post_collides_once_and_its_clearance_is_the_true_one() -> None:
     posts = [([4.0, 5.9, 0.0], [4.2, 6.1, 3.0]), ([8.0, 6.5, 0.0], [8.2, 6.7, 3.0])]
     line = planned([[[0.0, 6.0, 1.2], [1.0, 0.0, 0.0]]], [0.0, 10.0])
-    values = measures(line, make_world(posts))
+    values = figures(line, make_world(posts))
     assert values["plan_collisions"] == 1  # the second post stays 0.5 m away
-    aside = measures(line, make_world(posts[1:]))
+    aside = figures(line, make_world(posts[1:]))
     assert aside["plan_collisions"] == 0
     assert aside["plan_min_clearance_m"] == pytest.approx(0.5, abs=1e-5)
 

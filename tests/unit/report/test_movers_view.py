@@ -16,7 +16,7 @@ from tests.inspections import building
 from tests.logs import changed, empty_log, make_log, make_replan, make_world
 from uavexp.bodies import ABSENT_M
 from uavexp.log import Contact, TrialLog
-from uavexp.metrics import evaluate
+from uavexp.metrics.evaluate import evaluate
 from uavexp.metrics.tracking_movers import near_misses
 from uavexp.report import flight3d, labels, movers_view, picture, picture_layout, plan_view
 from uavexp.report.flight3d import _movers

@@ -11,7 +11,7 @@ import pytest
 
 from tests.logs import empty_log, make_log, make_replan, make_world
 from uavexp.log import Contact, TrialLog
-from uavexp.metrics import evaluate
+from uavexp.metrics.evaluate import evaluate
 from uavexp.report import cross_section, picture_layout, plan_view
 from uavexp.report.picture import draw
 from uavexp.types import Outcome, World

@@ -9,8 +9,8 @@ import pytest
 
 from tests.logs import make_log, make_replan, make_world, still_curve
 from uavexp.log import Contact
-from uavexp.metrics import evaluate
-from uavexp.metrics.replanning import blocked_delays, request_delays
+from uavexp.metrics.evaluate import evaluate
+from uavexp.metrics.replanning import answers, request_delays
 
 WORLD = make_world([])
 
@@ -103,7 +103,7 @@ class TestBlocked:
             for delay in delays:
                 first.setdefault(delay.blocked_since_s, delay.delay_s)
             answered = [delay_s for since_s, delay_s in first.items() if not math.isnan(since_s)]
-            mean_s = blocked_delays(log)["blocked_delay_s"]
+            mean_s = answers(log).delay_s
             assert mean_s == pytest.approx(np.mean(answered) if answered else math.nan, nan_ok=True)
         assert told > 50
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,10 +9,11 @@ import pytest
 
 import uavexp
 from tests.components import build
+from tests.logs import changed
 from uavexp.braking import with_stop
 from uavexp.check.hall import LIMITS, STRAIGHT, goal_at, observe, room
 from uavexp.log import TrialLog
-from uavexp.metrics.replanning import blocked_delays
+from uavexp.metrics.replanning import answers
 from uavexp.types import Outcome, PlanStatus
 
 REPLANNING = ("any_of", "collision_check", "distance", "expiry", "frontier_covered", "mcr", "tbr")
@@ -48,17 +48,17 @@ def test_arrives(trigger: str) -> None:
     planned_s = min(one.effective_s for one in log.replans if one.status is PlanStatus.OK)
     assert np.isnan(log.ticks.remaining_clearance_m[log.ticks.tick_s < planned_s - 1e-6]).all()
     assert np.isfinite(log.ticks.remaining_clearance_m[log.ticks.tick_s >= planned_s][:5]).all()
-    delays = blocked_delays(log)
+    found = answers(log)
     if trigger in COLLISION_ONLY:
-        assert delays["blocked_unanswered"] == delays["blocked_cleared"] == 0
-        assert delays["blocked_delay_s"] == 0.0 or delays["blocked_episodes"] == 0
+        assert found.unanswered == found.cleared == 0
+        assert found.delay_s == 0.0 or found.episodes == 0
 
 
 @pytest.mark.parametrize("trigger", ONCE)
 def test_a_single_plan_stays_blocked(trigger: str) -> None:
-    delays = blocked_delays(flown(trigger, explorer="target_only"))
-    assert np.isnan(delays["blocked_delay_s"])
-    assert delays["blocked_unanswered"] + delays["blocked_cleared"] == delays["blocked_episodes"] > 0
+    found = answers(flown(trigger, explorer="target_only"))
+    assert np.isnan(found.delay_s)
+    assert found.unanswered + found.cleared == found.episodes > 0
 
 
 @pytest.mark.parametrize("trigger", [*REPLANNING, *ONCE])
