@@ -23,7 +23,7 @@ from uavexp.planner.base import Planner
 from uavexp.recorder import Recorder, Stopwatch, seen_share
 from uavexp.safety.base import Safety
 from uavexp.scene import Scene
-from uavexp.seeding import Stream, generator
+from uavexp.seeding import Stream, generator, only_seeded_draws
 from uavexp.sensor.base import Sensor
 from uavexp.trigger.base import TriggerPolicy
 from uavexp.types import MapUpdate, Observation, Outcome, Reference, State, Tracks, World
@@ -89,6 +89,7 @@ def steps_per(step_s: float, name: str, duration_s: float) -> int:
     return steps
 
 
+@only_seeded_draws()
 def fly_trial(parts: Parts, seed: int, progress: Progress | None = None) -> tuple[World, TrialLog]:
     """Draw the seed's world (that of `world_seed`, if set) and fly one trial in it.
 
@@ -102,6 +103,7 @@ def fly_trial(parts: Parts, seed: int, progress: Progress | None = None) -> tupl
 
     Raises:
         WorldError: when the world cannot be made.
+        ConfigError: a part drew from a global generator.
     """
     layout = seed if parts.world_seed is None else parts.world_seed
     world = parts.world.generate(generator(layout, Stream.WORLD))

@@ -17,7 +17,8 @@ from uavexp.errors import ConfigError
 from uavexp.geometry import rotation_from_quaternion
 from uavexp.scene import Scene
 from uavexp.trial import steps_per
-from uavexp.types import Outcome, PlanStatus
+from uavexp.trigger.tbr import Tbr
+from uavexp.types import Decision, Outcome, PlanStatus
 
 SMALL: Mapping[str, Any] = {
     "world": "random_columns",
@@ -161,3 +162,16 @@ def test_rates_must_fit_the_step() -> None:
     assert steps_per(0.01, "latency_s", 0.03) == 3
     with pytest.raises(ConfigError, match="whole multiple of step_s"):
         steps_per(0.01, "1 / sensor.rate_hz", 1.0 / 30.0)
+
+
+def test_a_trigger_that_draws_from_the_global_generator_ends_the_flight(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The same command used to make 18 replans, and 20 the next time."""
+
+    def decide(self: Tbr, observation: object) -> Decision:
+        return Decision(replan=np.random.random() < 0.1, cause="luck")  # noqa: NPY002
+
+    monkeypatch.setattr(Tbr, "decide", decide)
+    with pytest.raises(ConfigError, match="numpy's global generator"):
+        fly(strategy="tbr")

@@ -19,7 +19,7 @@ from uavexp.config.experiment import Experiment, LabelledCell, expand, list_expe
 from uavexp.config.interpolation import resolved
 from uavexp.config.options import EXPERIMENT_GROUP, PRESET_GROUP, RUNNER_GROUP, list_options, read_option
 from uavexp.config.overrides import Setting, expand_grid, expand_seeds, render
-from uavexp.config.trees import TRIGGER_GROUP, Trees
+from uavexp.config.trees import CONFIG_NAME, TRIGGER_GROUP, Trees
 from uavexp.config.trust import check_trust
 from uavexp.errors import ConfigError
 from uavexp.parameters import nearest
@@ -61,12 +61,15 @@ class Composer:
     user_folder: Path | None = None
     options: dict[str, dict[str, Path]] = field(init=False)
     experiments: dict[str, Path] = field(init=False)
+    _keys: tuple[str, ...] = field(init=False, repr=False)  # of a composed tree
     _trees: Trees = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         folders = [conf_folder(), *([self.user_folder] if self.user_folder else [])]
         self.options = list_options(folders)
         self.experiments = list_experiments(self.user_folder)
+        shared = read_option(conf_folder() / f"{CONFIG_NAME}.yaml").parameters
+        self._keys = (*GROUPS, *(item.name for item in shared), RUNNER_GROUP, "hydra")
         self._trees = Trees(user_folder=self.user_folder)
 
     def command(self, settings: Sequence[Setting]) -> Command:
@@ -145,16 +148,28 @@ class Composer:
     def cell(self, settings: Sequence[Setting], labels: Mapping[str, str] | None = None) -> Cell:
         """Compose and check one cell; each setting has one value."""
         tree = self.compose(settings)
-        options = {group: tree["hydra"]["runtime"]["choices"][group] for group in GROUPS}
+        choices = tree["hydra"]["runtime"]["choices"]
+        self._refuse_stray_keys(tree, choices)
+        options = {group: choices[group] for group in GROUPS}
         config = check_config({key: tree[key] for key in (*GROUPS, *TOP_LEVEL)}, options)
-        strategy = tree["hydra"]["runtime"]["choices"].get(PRESET_GROUP)
         return Cell(
-            strategy=strategy or options[TRIGGER_GROUP],
+            strategy=choices.get(PRESET_GROUP) or options[TRIGGER_GROUP],
             options=options,
             config=config,
             settings=tuple(settings),
             labels=dict(labels or {}),
         )
+
+    def _refuse_stray_keys(self, tree: Mapping[str, Any], choices: Mapping[str, str]) -> None:
+        """Refuse what an option or a preset sets where no flight reads it."""
+        for key in tree:
+            if key in choices and key not in self._keys:
+                raise ConfigError(
+                    f"{key}={choices[key]} sets nothing: its file must begin with # @package _global_"
+                )
+            if key not in self._keys:
+                known = (PRESET_GROUP, *self._keys)
+                raise ConfigError(f"unknown key '{key}' in an option{nearest(key, known)}")
 
     def compose(self, settings: Sequence[Setting]) -> dict[str, Any]:
         """Compose one cell into a plain, resolved, trusted tree, `hydra` included."""

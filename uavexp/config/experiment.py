@@ -96,7 +96,7 @@ def read_experiment(name: str, file: Path, *, borrow: bool = True) -> Experiment
     seed = tree.get("seed", "0")
     if not isinstance(seed, str):
         raise ConfigError(f'experiments={name}: quote the seeds, seed: "{seed}" (1:20 unquoted is 80)')
-    return Experiment(
+    experiment = Experiment(
         name=name,
         title=str(tree.get("title", name)),
         report={key: _listed(name, file, key, tree[key]) for key in _REPORT if key in tree},
@@ -111,14 +111,29 @@ def read_experiment(name: str, file: Path, *, borrow: bool = True) -> Experiment
             if borrow or not isinstance(entries, str)
         },
     )
+    if borrow:
+        _check_primary(experiment)
+    return experiment
+
+
+def _check_primary(experiment: Experiment) -> None:
+    """Refuse a primary arm that no axis has: what is compared with it would be silently left out."""
+    primary = experiment.settings.get("primary")
+    entries = [entry for axis in experiment.axes.values() for entry in axis]
+    if primary and primary not in entries:
+        hint = nearest(str(primary), entries)
+        raise ConfigError(f"experiments={experiment.name}: settings.primary={primary}: no such arm{hint}")
 
 
 def _load(name: str, file: Path) -> dict[Any, Any]:
     import yaml  # type: ignore[import-untyped]
+    from omegaconf import OmegaConf
+    from omegaconf.errors import OmegaConfBaseException
 
     try:
-        tree = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except (OSError, yaml.YAMLError) as error:
+        loaded = OmegaConf.load(file)  # unlike yaml itself, it refuses a key that stands there twice
+        tree = OmegaConf.to_container(loaded, resolve=False)
+    except (OSError, ValueError, yaml.YAMLError, OmegaConfBaseException) as error:
         raise ConfigError(f"experiments={name} cannot be read: {one_line(error)}") from error
     return tree if isinstance(tree, dict) else {}
 

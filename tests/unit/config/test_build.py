@@ -330,3 +330,18 @@ def test_a_folder_with_odd_characters_is_found(tmp_path: Path) -> None:
     assert (
         command("planner=mine", composer=Composer(user_folder=folder)).cells[0].options["planner"] == "mine"
     )
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("trigger: {interval_s: 1.0}\n", ["strategy=mine sets nothing", "# @package _global_"]),
+        ("# @package _global_\ntriger: {interval_s: 1.0}\n", ["unknown key 'triger'", "'trigger'"]),
+    ],
+)
+def test_a_preset_that_sets_nothing_is_refused(tmp_path: Path, text: str, words: list[str]) -> None:
+    """It used to fly the defaults under its own name."""
+    (tmp_path / "strategy").mkdir()
+    (tmp_path / "strategy" / "mine.yaml").write_text(text)
+    told = refusal("strategy=mine", composer=Composer(user_folder=tmp_path))
+    assert all(word in told for word in words), told

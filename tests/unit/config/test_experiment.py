@@ -108,6 +108,12 @@ def test_mistakes_are_told(composer: Composer, typed: list[str], words: list[str
         ("axes: {arm: {a: {out: x}}}", ["out has its own place"]),
         ("axes: {arm: {a: {strategy: 'mcr,,'}}}", ["cannot read"]),
         ("axes: [", ["cannot be read"]),
+        ("axes: {arm: {a: {strategy: mcr}, a: {strategy: tbr}}}", ["cannot be read", "duplicate key a"]),
+        ("axes: {arm: {a: {strategy: mcr}}, arm: {b: {strategy: tbr}}}", ["duplicate key arm"]),
+        (
+            "axes: {arm: {MCR: {strategy: mcr}}}\nsettings: {primary: MRC}",
+            ["settings.primary=MRC: no such arm (did you mean 'MCR'?)"],
+        ),
     ],
 )
 def test_a_bad_file_is_told(tmp_path: Path, text: str, words: list[str]) -> None:
