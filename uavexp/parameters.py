@@ -84,6 +84,16 @@ def option(cls: type[T]) -> type[T]:
 
     Its own `__post_init__` comes after that, for what ties parameters together.
     """
+    return _checked(cls, frozen=False)
+
+
+@typing.dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(dataclasses.field,))
+def frozen_option(cls: type[T]) -> type[T]:
+    """An `option` that nothing changes: what runs is an object of its own."""
+    return _checked(cls, frozen=True)
+
+
+def _checked(cls: type[T], *, frozen: bool) -> type[T]:
     then = getattr(cls, "__post_init__", None)
 
     def __post_init__(self: Any) -> None:
@@ -94,7 +104,7 @@ def option(cls: type[T]) -> type[T]:
 
     cls.__post_init__ = __post_init__  # type: ignore[attr-defined]
     cls.__option__ = True  # type: ignore[attr-defined]
-    return dataclasses.dataclass(slots=True, kw_only=True)(cls)
+    return dataclasses.dataclass(slots=True, kw_only=True, frozen=frozen)(cls)
 
 
 def is_option(item: object) -> bool:

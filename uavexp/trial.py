@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from uavexp.controller.base import Controller
 from uavexp.detection.base import Detection
-from uavexp.errors import require, require_non_negative, require_positive
+from uavexp.errors import require
 from uavexp.estimator.base import Estimator
 from uavexp.explorer.base import Explorer
 from uavexp.geometry import quaternion_from_yaw
@@ -18,6 +17,7 @@ from uavexp.log import TrialLog
 from uavexp.mapping.base import MapBackend
 from uavexp.mission.base import Mission
 from uavexp.movers.base import Movers
+from uavexp.parameters import NonNegative, Positive, Whole, frozen_option
 from uavexp.pilot.base import Crew, Pilot, Piloting
 from uavexp.planner.base import Planner
 from uavexp.recorder import Recorder, Stopwatch, seen_share
@@ -34,7 +34,7 @@ from uavexp.world.base import WorldGenerator
 Progress = Callable[[float, str], None]  # simulated time s, a few words
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@frozen_option
 class Parts:
     """One component per role and the few numbers that belong to no role."""
 
@@ -52,18 +52,13 @@ class Parts:
     detection: Detection
     mission: Mission
     pilot: Pilot
-    world_seed: int | None = None  # of the layout alone; None: the trial's seed
-    step_s: float = 0.01
-    latency_s: float = 0.03
-    start_bubble_m: float = 0.6
-    stuck_s: float = 20.0
+    world_seed: Whole | None = None  # of the layout alone; None: the trial's seed
+    step_s: Positive = 0.01
+    latency_s: NonNegative = 0.03
+    start_bubble_m: NonNegative = 0.6
+    stuck_s: Positive = 20.0
 
     def __post_init__(self) -> None:
-        require_positive(step_s=self.step_s, stuck_s=self.stuck_s)
-        require_non_negative(latency_s=self.latency_s, start_bubble_m=self.start_bubble_m)
-        require(
-            self.world_seed is None or self.world_seed >= 0, f"world_seed must be >= 0, got {self.world_seed}"
-        )
         steps_per(self.step_s, "latency_s", self.latency_s)
         for name, rate_hz in self.rates_hz().items():
             steps = steps_per(self.step_s, f"1 / {name}", 1.0 / rate_hz)

@@ -17,11 +17,11 @@ import yaml
 from uavexp.config.build import (
     GROUPS,
     TARGET,
-    TOP_LEVEL,
     build_component,
     component_class,
     protocol_members,
     protocol_of,
+    top_level,
 )
 from uavexp.config.composition import Composer
 from uavexp.config.generate import option_files
@@ -55,7 +55,7 @@ def test_every_group_is_a_folder_a_package_and_a_role_of_a_trial() -> None:
     folders = {item.name for item in CONF.iterdir() if item.is_dir()}
     assert folders == {*GROUPS, PRESET_GROUP, RUNNER_GROUP}
     assert all((PACKAGE / group / "base.py").is_file() for group in GROUPS)
-    assert [item.name for item in dataclasses.fields(Parts)] == [*GROUPS, *TOP_LEVEL]
+    assert [item.name for item in dataclasses.fields(Parts)] == [*GROUPS, *top_level()]
 
 
 def test_every_group_has_an_option_and_a_default_that_exists() -> None:
@@ -66,8 +66,8 @@ def test_every_group_has_an_option_and_a_default_that_exists() -> None:
 
 def test_the_defaults_of_no_group_are_those_of_a_trial() -> None:
     config = yaml.safe_load((CONF / "config.yaml").read_text())
-    defaults = {item.name: item.default for item in dataclasses.fields(Parts) if item.name in TOP_LEVEL}
-    assert {key: config[key] for key in TOP_LEVEL} == defaults
+    defaults = {item.name: item.default for item in dataclasses.fields(Parts) if item.name in top_level()}
+    assert {key: config[key] for key in top_level()} == defaults
 
 
 def test_the_yaml_of_every_option_is_what_make_conf_writes() -> None:

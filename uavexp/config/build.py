@@ -38,13 +38,6 @@ GROUPS = (
     "mission",
     "pilot",
 )
-TOP_LEVEL: dict[str, Any] = {
-    "world_seed": int | None,
-    "step_s": float,
-    "latency_s": float,
-    "start_bubble_m": float,
-    "stuck_s": float,
-}
 TARGET = "_target_"
 
 
@@ -58,6 +51,14 @@ class NeedsOthers(Protocol):
         Args:
             parts: the fields of `uavexp.trial.Parts` by name; it names those that it looks at.
         """
+
+
+@functools.cache
+def top_level() -> dict[str, Any]:
+    """Name and type of the keys of no group: the fields of a trial's parts that are no component."""
+    from uavexp.trial import Parts
+
+    return {name: kind for name, kind in parameter_types(Parts).items() if name not in GROUPS}
 
 
 def check_config(config: Mapping[str, Any], options: Mapping[str, str]) -> dict[str, Any]:
@@ -74,7 +75,7 @@ def check_config(config: Mapping[str, Any], options: Mapping[str, str]) -> dict[
         ConfigError: a wrong class, an unknown or missing parameter, a wrong type; every
             constructor has accepted its values when this returns.
     """
-    checked: dict[str, Any] = {key: check_value(key, config[key], kind) for key, kind in TOP_LEVEL.items()}
+    checked: dict[str, Any] = {key: check_value(key, config[key], kind) for key, kind in top_level().items()}
     for group in GROUPS:
         tree = config[group]
         if not isinstance(tree, Mapping) or TARGET not in tree:
@@ -95,7 +96,7 @@ def build(config: Mapping[str, Any]) -> Parts:
     check_trust(config)
     components = {group: build_component(group, config[group]) for group in GROUPS}
     try:
-        parts = Parts(**components, **{key: config[key] for key in TOP_LEVEL})
+        parts = Parts(**components, **{key: config[key] for key in top_level()})
     except ArithmeticError as error:
         raise ConfigError(f"a rate or period does not fit the step: {error}") from error
     _check_needs(parts)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from uavexp.config.build import GROUPS, TOP_LEVEL, check_config
+from uavexp.config.build import GROUPS, check_config, top_level
 from uavexp.config.experiment import Experiment, LabelledCell, expand, list_experiments, read_experiment
 from uavexp.config.interpolation import resolved
 from uavexp.config.options import EXPERIMENT_GROUP, PRESET_GROUP, RUNNER_GROUP, list_options, read_option
@@ -119,7 +119,7 @@ class Composer:
             )
         experiment = read_experiment(name, self.experiments[name])
         for axis in experiment.axes:
-            if axis in (*GROUPS, *TOP_LEVEL, PRESET_GROUP, RUNNER_GROUP, "seed", "out"):
+            if axis in (*GROUPS, *top_level(), PRESET_GROUP, RUNNER_GROUP, "seed", "out"):
                 raise ConfigError(f"experiments={name}: an axis may not be called like the key {axis}")
         return experiment
 
@@ -151,7 +151,7 @@ class Composer:
         choices = tree["hydra"]["runtime"]["choices"]
         self._refuse_stray_keys(tree, choices)
         options = {group: choices[group] for group in GROUPS}
-        config = check_config({key: tree[key] for key in (*GROUPS, *TOP_LEVEL)}, options)
+        config = check_config({key: tree[key] for key in (*GROUPS, *top_level())}, options)
         return Cell(
             strategy=choices.get(PRESET_GROUP) or options[TRIGGER_GROUP],
             options=options,

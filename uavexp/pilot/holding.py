@@ -17,8 +17,8 @@ import numpy as np
 from uavexp import causes
 from uavexp.arrays import Float
 from uavexp.braking import braking_trajectory, with_stop
-from uavexp.errors import require, require_non_negative
 from uavexp.log import Replan
+from uavexp.parameters import Count, NonNegative, frozen_option
 from uavexp.pilot.base import Crew
 from uavexp.pilot.heading import Heading, bearing_rad
 from uavexp.pilot.noting import replan_of
@@ -30,26 +30,20 @@ _REST_MPS = 0.05  # slower is standing
 _YAW_SHARE = 0.9  # of the body-rate limit: roll and pitch need theirs
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@frozen_option
 class Holding:
     """The rules; `HoldingPilot` flies by them."""
 
-    settle_s: float = 0.5
-    restart_error_m: float = 0.4
-    goals_per_request: int = 3
-    look_around_radps: float = 0.8
-    turn_first_rad: float = 0.6
-    yaw_lookahead_s: float = 0.8
-
-    def __post_init__(self) -> None:
-        require_non_negative(
-            settle_s=self.settle_s,
-            restart_error_m=self.restart_error_m,
-            look_around_radps=self.look_around_radps,
-            turn_first_rad=self.turn_first_rad,
-            yaw_lookahead_s=self.yaw_lookahead_s,
-        )
-        require(self.goals_per_request >= 1, f"goals_per_request must be >= 1, got {self.goals_per_request}")
+    settle_s: NonNegative = 0.5  # s, hovering and mapping before the first plan, or it is made
+    # on a single scan [ours]
+    restart_error_m: NonNegative = 0.4  # m, tracking error from which a plan starts at the measured state
+    # instead of the reference; 0: always [ours]
+    goals_per_request: Count = 3  # so many goals are tried before the vehicle brakes [ours]
+    look_around_radps: NonNegative = 0.8  # rad/s, turning on the spot while there is no plan:
+    # only new sights can help [ours]
+    turn_first_rad: NonNegative = 0.6  # rad, from standstill the vehicle turns until it looks this close
+    # to its way (4: never) [ours]
+    yaw_lookahead_s: NonNegative = 0.8  # s, the yaw looks at the path so far ahead [ours]
 
     def begin(self, crew: Crew) -> HoldingPilot:
         """Begin a trial."""

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from uavexp.config.build import GROUPS, TARGET, TOP_LEVEL
+from uavexp.config.build import GROUPS, TARGET, top_level
 from uavexp.config.composition import Cell
 from uavexp.errors import ConfigError
 from uavexp.flight import Trial
@@ -41,7 +41,7 @@ def identity(cell: Cell) -> dict[str, Any]:
         group: {key: _content(group, key, value) for key, value in cell.config[group].items()}
         for group in GROUPS
     }
-    numbers = {key: cell.config[key] for key in TOP_LEVEL}
+    numbers = {key: cell.config[key] for key in top_level()}
     return {"strategy": cell.strategy, "options": cell.options, "config": {**config, **numbers}}
 
 
