@@ -15,10 +15,10 @@ from rich.console import Console
 
 from uavexp.config.composition import Composer
 from uavexp.config.overrides import parse_settings
+from uavexp.sweep.agenda import agenda_of
 from uavexp.sweep.job import Job, Limits
 from uavexp.sweep.local import run_local, start_fork_server
-from uavexp.sweep.plan import plan_of
-from uavexp.sweep.task import fly_task
+from uavexp.sweep.trial_job import fly_job
 
 SEEDS = "0:8"
 LIMITS = Limits(timeout_s=600.0, memory_mb=4096.0)
@@ -27,7 +27,7 @@ LIMITS = Limits(timeout_s=600.0, memory_mb=4096.0)
 def seconds(jobs: list[Job], n_jobs: int) -> float:
     """Clock time of these jobs with so many workers."""
     begin = time.perf_counter()
-    statuses = [done.answer.status for done in run_local(fly_task, jobs, n_jobs=n_jobs, limits=LIMITS)]
+    statuses = [done.answer.status for done in run_local(fly_job, jobs, n_jobs=n_jobs, limits=LIMITS)]
     assert {str(status) for status in statuses} == {"ok"}
     return time.perf_counter() - begin
 
@@ -35,7 +35,7 @@ def seconds(jobs: list[Job], n_jobs: int) -> float:
 def here(job: Job) -> float:
     """Clock time of one job in this process."""
     begin = time.perf_counter()
-    fly_task(job.payload, lambda time_s, words: None)
+    fly_job(job.payload, lambda time_s, words: None)
     return time.perf_counter() - begin
 
 
@@ -44,7 +44,7 @@ def main() -> None:
     console = Console()
     command = Composer().command(parse_settings(["strategy=mcr", f"seed={SEEDS}"]))
     with tempfile.TemporaryDirectory() as folder:
-        jobs = list(plan_of(command, Path(folder)).jobs)
+        jobs = list(agenda_of(command, Path(folder)).jobs)
     start_fork_server(["uavexp.sweep.preload"])
     here(jobs[0]), seconds(jobs[:1], 1)  # first calls are not measurements
     ratios = [seconds([job], 1) / here(job) for job in jobs]

@@ -26,8 +26,8 @@ from uavexp.store.table import pooled_versions
 
 if TYPE_CHECKING:
     from uavexp.store.table import Row
+    from uavexp.sweep.agenda import Agenda
     from uavexp.sweep.job import Done, Job
-    from uavexp.sweep.plan import Plan
 
 _PATIENCE_S = 2.0  # nothing is shown for work that is done sooner
 _PLAIN_PERIOD_S = 10.0  # between lines when the output is no terminal
@@ -53,18 +53,18 @@ class Terminal:
         self._last_s = time.monotonic()
         self._console.print(line, markup=False)
 
-    def listing(self, plan: Plan, folder: Path) -> None:
+    def listing(self, agenda: Agenda, folder: Path) -> None:
         """Print what would be flown."""
-        self._announce(plan, "to fly")
-        for job in plan.left:
+        self._announce(agenda, "to fly")
+        for job in agenda.left:
             self.say(f"{job.name}  {job.payload.command}")
         self.say(str(folder))
 
     @contextmanager
-    def progress(self, plan: Plan) -> Iterator[None]:
+    def progress(self, agenda: Agenda) -> Iterator[None]:
         """Show progress over the trials that are left while the block runs."""
-        self._total, self._begin_s = len(plan.left), time.monotonic()
-        self._announce(plan, "flying")
+        self._total, self._begin_s = len(agenda.left), time.monotonic()
+        self._announce(agenda, "flying")
         if not self._console.is_terminal or not self._total:
             yield
             return
@@ -113,28 +113,28 @@ class Terminal:
         how = "the same command" if again else f"the same command with out={folder}"
         self.say(f"stopped: {flown} of {total} trials are kept in {folder}; {how} flies the others")
 
-    def flown(self, plan: Plan, rows: Sequence[Row]) -> None:
+    def flown(self, agenda: Agenda, rows: Sequence[Row]) -> None:
         """Print what has been flown; of an experiment, make and print the report; the folder last.
 
         Args:
-            plan: what was asked; only its trials are shown.
+            agenda: what was asked; only its trials are shown.
             rows: of `trials.parquet`.
         """
-        self._summary(plan, rows)
-        if plan.study.name:
-            self._report(plan.study.folder)
-        self.say(str(plan.study.folder))
+        self._summary(agenda, rows)
+        if agenda.study.name:
+            self._report(agenda.study.folder)
+        self.say(str(agenda.study.folder))
 
-    def _summary(self, plan: Plan, rows: Sequence[Row]) -> None:
+    def _summary(self, agenda: Agenda, rows: Sequence[Row]) -> None:
         """Tables of trials, how to repeat them, and their pictures."""
-        commands = {job.name: job.payload.command for job in plan.jobs}
+        commands = {job.name: job.payload.command for job in agenda.jobs}
         if pooled := pooled_versions((row["code"], row["lock"]) for row in rows):
             self.say(pooled)
         rows = [row for row in rows if row["trial"] in commands]
         few = len(rows) <= _MAX_ROWS
         # as wide as it needs: a cut-off number is worse than a wrapped line
         wide = Console(file=self._console.file, width=_TABLE_WIDTH)
-        wide.print(trial_table(rows) if few else cell_table(rows, list(plan.study.axes)))
+        wide.print(trial_table(rows) if few else cell_table(rows, list(agenda.study.axes)))
         for row in rows if few else [row for row in rows if row["status"] != "ok"][:_MAX_FAILURES]:
             if row["reason"]:
                 ending = f"ended {row['outcome']}" if row["status"] == "ok" else str(row["status"])
@@ -142,7 +142,7 @@ class Terminal:
         for row in rows if few else []:
             self.say(f"repeat:  {commands[row['trial']]}")
             if row["status"] == "ok":
-                self.say(f"picture: {plan.study.folder / TRIALS / row['trial'] / PICTURE}")
+                self.say(f"picture: {agenda.study.folder / TRIALS / row['trial'] / PICTURE}")
 
     def _report(self, folder: Path) -> None:
         """Make the report, and print where its files are: tables and figures by their folder."""
@@ -153,13 +153,13 @@ class Terminal:
         for place in dict.fromkeys(path if path.parent == folder else path.parent for path in paths):
             self.say(f"report:  {place}")
 
-    def _announce(self, plan: Plan, doing: str) -> None:
-        finished = len(plan.jobs) - len(plan.left)
-        words = [f"{doing} {_count(len(plan.left))}" if plan.left else "nothing is left to fly"]
+    def _announce(self, agenda: Agenda, doing: str) -> None:
+        finished = len(agenda.jobs) - len(agenda.left)
+        words = [f"{doing} {_count(len(agenda.left))}" if agenda.left else "nothing is left to fly"]
         words += [f"{_count(finished)} finished before"] if finished else []
-        words += [f"{_count(plan.again)} failed before and fly again"] if plan.again else []
+        words += [f"{_count(agenda.again)} failed before and fly again"] if agenda.again else []
         self.say("; ".join(words))
-        for name, what in plan.stock.damaged.items():
+        for name, what in agenda.stock.damaged.items():
             self.say(f"damaged, set aside: {name} ({what})")
 
     def _standing(self) -> str:

@@ -1,80 +1,48 @@
-"""`${key}` in a composed tree: resolved when it names a key, refused when it would run something."""
+"""`${key}` in a composed tree: the value of another key, and nothing that would run something."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
-from uavexp.errors import ConfigError, one_line
+from uavexp.errors import ConfigError
 
-_KEY_REFERENCE = re.compile(r"\$\{(\w+)\}")
+_REFERENCE = re.compile(r"\$\{([A-Za-z_]\w*(?:\.\w+)*)\}")
 
 
-def resolved(tree: dict[str, Any]) -> dict[str, Any]:
-    """Resolve `${key}`; refuse `${resolver:...}`, which reads clocks, environment or text as code."""
-    from omegaconf import OmegaConf
-    from omegaconf.errors import OmegaConfBaseException
+def resolved(tree: Mapping[str, Any]) -> dict[str, Any]:
+    """Replace every `${key}` and `${group.key}` by that value; `hydra` stays as it is.
 
-    hydra = tree["hydra"]
+    Raises:
+        ConfigError: a key that is not there or names itself; `${resolver:...}`, which reads clocks,
+            environment or text as code; a reference within other text.
+    """
     own = {key: value for key, value in tree.items() if key != "hydra"}
-    found = list(_interpolations(own, ""))
-    if all(_names_plain_key(text, own) for _, text in found):
-        return {**_follow(own, own), "hydra": hydra}  # OmegaConf takes 20 ms for the same
-    for key, text in found:
-        if _calls_resolver(text):
-            raise ConfigError(f"{key}={text}: only ${{key}} may be used in a value, no ${{resolver:...}}")
-    try:
-        resolved: Any = OmegaConf.to_container(OmegaConf.create(own), resolve=True)
-    except OmegaConfBaseException as error:
-        raise ConfigError(f"the configuration does not resolve: {with_cause(error)}") from error
-    return {**resolved, "hydra": hydra}
+    return {**_resolve(own, own, "", ()), "hydra": tree["hydra"]}
 
 
-def _names_plain_key(text: str, top: Mapping[str, Any]) -> bool:
-    """Whether a text is `${key}` and nothing else, of a top-level key that holds one final value."""
-    match = _KEY_REFERENCE.fullmatch(text)
-    value = top.get(match[1], {}) if match else {}
-    return not isinstance(value, Mapping | list) and "${" not in str(value)
-
-
-def _follow(node: Any, top: Mapping[str, Any]) -> Any:
-    """The node with every `${key}` replaced by that top-level value."""
-    if isinstance(node, dict):
-        return {key: _follow(value, top) for key, value in node.items()}
-    if isinstance(node, list):
-        return [_follow(value, top) for value in node]
-    match = _KEY_REFERENCE.fullmatch(node) if isinstance(node, str) else None
-    return top[match[1]] if match else node
-
-
-def _interpolations(node: Any, path: str) -> Iterator[tuple[str, str]]:
+def _resolve(node: Any, top: Mapping[str, Any], path: str, followed: tuple[str, ...]) -> Any:
     if isinstance(node, Mapping):
-        for key, value in node.items():
-            yield from _interpolations(value, f"{path}.{key}" if path else str(key))
-    elif isinstance(node, list):
-        for index, value in enumerate(node):
-            yield from _interpolations(value, f"{path}[{index}]")
-    elif isinstance(node, str) and "${" in node:
-        yield path, node
+        return {
+            key: _resolve(value, top, f"{path}.{key}".strip("."), followed) for key, value in node.items()
+        }
+    if isinstance(node, list):
+        return [_resolve(value, top, f"{path}[{index}]", followed) for index, value in enumerate(node)]
+    if not isinstance(node, str) or "${" not in node:
+        return node
+    match = _REFERENCE.fullmatch(node)
+    if match is None or match[1] in followed:
+        raise ConfigError(
+            f"{path}={node}: only ${{key}} of another key may be used in a value, no ${{resolver:...}}"
+        )
+    return _resolve(_value(top, match[1], f"{path}={node}"), top, path, (*followed, match[1]))
 
 
-def _calls_resolver(text: str) -> bool:
-    from omegaconf.errors import GrammarParseError
-    from omegaconf.grammar_parser import parse
-
-    def walk(context: Any) -> bool:
-        if type(context).__name__ == "InterpolationResolverContext":
-            return True
-        return any(walk(child) for child in getattr(context, "children", None) or ())
-
-    try:
-        return walk(parse(text))
-    except GrammarParseError as error:
-        raise ConfigError(f"cannot read the value {text!r}") from error
-
-
-def with_cause(error: BaseException) -> str:
-    """Message of an error and of its cause, in one line."""
-    cause = error.__cause__
-    return (one_line(error) or type(error).__name__) + (f" ({one_line(cause)})" if cause else "")
+def _value(top: Mapping[str, Any], key: str, where: str) -> Any:
+    node: Any = top
+    for name in key.split("."):
+        if not isinstance(node, Mapping) or name not in node:
+            raise ConfigError(f"{where}: there is no key {key}")
+        node = node[name]
+    return node

@@ -9,10 +9,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from uavexp.config.interpolation import with_cause
 from uavexp.config.options import PRESET_GROUP
 from uavexp.config.overrides import quoted
-from uavexp.errors import ConfigError
+from uavexp.errors import ConfigError, one_line
 from uavexp.paths import conf_folder
 
 TRIGGER_GROUP = "trigger"  # what presets choose
@@ -93,7 +92,7 @@ class Trees:
                 composed = compose(CONFIG_NAME, overrides=arguments, return_hydra_config=True)
             tree: Any = OmegaConf.to_container(composed, resolve=False)
         except bad_input as error:
-            raise ConfigError(f"the configuration does not compose: {with_cause(error)}") from error
+            raise ConfigError(f"the configuration does not compose: {_with_cause(error)}") from error
         return dict(tree)
 
 
@@ -105,3 +104,9 @@ def _without(tree: Mapping[str, Any], group: str) -> dict[str, Any]:
 
 def _file_url(folder: Path) -> str:
     return quoted(f"file://{folder}")
+
+
+def _with_cause(error: BaseException) -> str:
+    """Message of an error and of its cause, in one line."""
+    cause = error.__cause__
+    return (one_line(error) or type(error).__name__) + (f" ({one_line(cause)})" if cause else "")

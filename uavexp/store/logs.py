@@ -104,6 +104,23 @@ def unpack(path: Path) -> Arrays:
         raise RecordError(f"{path}: cannot be read ({error})") from error
 
 
+def check_packed(path: Path) -> None:
+    """Refuse an npz file that is missing, cut or changed since it was written, by its CRC.
+
+    Nothing is unpacked.
+
+    Raises:
+        RecordError: so it is.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            bad = archive.testzip()
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError) as error:
+        raise RecordError(f"{path}: damaged ({error})") from error
+    if bad is not None:
+        raise RecordError(f"{path}: damaged ({bad})")
+
+
 def write_log(path: Path, arrays: Mapping[str, npt.NDArray[Any]]) -> None:
     """Write the arrays of a log atomically; equal logs give equal bytes."""
     write_bytes(path, pack(arrays))

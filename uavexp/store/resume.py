@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import shlex
-import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum, auto
@@ -12,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from uavexp.errors import RecordError
+from uavexp.store.logs import check_packed
 from uavexp.store.records import LOG, OtherVersionError, Status, read_record, trial_name
 from uavexp.store.study import Study, StudyCell, read_runs, trial_folders
 
@@ -113,24 +112,13 @@ def _judge(trial: Path, version: Mapping[str, Any]) -> tuple[_State, str]:
             return _State.DAMAGED, "its record is of another trial"
         if record["status"] != Status.OK:
             return _State.FAILED, ""
-        _check_log(trial / LOG)
+        check_packed(trial / LOG)
     except OtherVersionError as error:
         raise RecordError(f"{error}; name another folder with out=DIR") from error
     except (RecordError, KeyError, TypeError) as error:
         return _State.DAMAGED, str(error)
     same = all(record.get(name) == value for name, value in version.items())
     return (_State.FINISHED if same else _State.OTHER), ""
-
-
-def _check_log(path: Path) -> None:
-    """Refuse a log that is missing, cut or changed since it was written (by its CRC)."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            bad = archive.testzip()
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError) as error:
-        raise RecordError(f"{path}: damaged ({error})") from error
-    if bad is not None:
-        raise RecordError(f"{path}: damaged ({bad})")
 
 
 def _named(states: Mapping[str, _State], state: _State) -> frozenset[str]:

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import zipfile
-import zlib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from uavexp.errors import RecordError
-from uavexp.store.logs import pack, unpack
+from uavexp.store.logs import check_packed, pack, unpack
 from uavexp.store.records import write_bytes
 from uavexp.types import Difficulty, Surface, World
 
@@ -30,12 +28,12 @@ def world_bytes(world: World) -> bytes:
 
 
 def is_whole(path: Path) -> bool:
-    """Whether a world's file is there and as it was written (by its CRC); nothing is unpacked."""
+    """Whether a world's file is there and as it was written; nothing is unpacked."""
     try:
-        with zipfile.ZipFile(path) as archive:
-            return archive.testzip() is None
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError):
+        check_packed(path)
+    except RecordError:
         return False
+    return True
 
 
 def write_world(path: Path, world: World) -> None:

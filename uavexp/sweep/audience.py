@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Protocol
 
 from uavexp.store.table import Row
+from uavexp.sweep.agenda import Agenda
 from uavexp.sweep.job import Done, Job
-from uavexp.sweep.plan import Plan
 
 
 class Audience(Protocol):
@@ -18,10 +18,10 @@ class Audience(Protocol):
     def say(self, line: str) -> None:
         """Pass on one line."""
 
-    def listing(self, plan: Plan, folder: Path) -> None:
+    def listing(self, agenda: Agenda, folder: Path) -> None:
         """Tell what would be flown."""
 
-    def progress(self, plan: Plan) -> AbstractContextManager[None]:
+    def progress(self, agenda: Agenda) -> AbstractContextManager[None]:
         """Follow the trials that are left while the block runs."""
 
     def watch(self, job: Job, time_s: float, words: str) -> None:
@@ -33,5 +33,5 @@ class Audience(Protocol):
     def stopped(self, folder: Path, flown: int, total: int, *, again: bool) -> None:
         """Tell what an interrupted command leaves and how to go on."""
 
-    def flown(self, plan: Plan, rows: Sequence[Row]) -> None:
+    def flown(self, agenda: Agenda, rows: Sequence[Row]) -> None:
         """Tell what a command that went to its end leaves: the rows of `trials.parquet`."""

@@ -10,7 +10,7 @@ import pkgutil
 from uavexp.config.build import GROUPS
 from uavexp.sweep import kernels
 
-_ALSO = ("uavexp.trial", "uavexp.metrics", "uavexp.report.picture", "uavexp.sweep.task")
+_ALSO = ("uavexp.trial", "uavexp.metrics", "uavexp.report.picture", "uavexp.sweep.trial_job")
 
 
 def _import_everything() -> None:

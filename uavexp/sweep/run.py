@@ -18,15 +18,15 @@ from uavexp.store.history import FLYING, Run
 from uavexp.store.records import Status, write_text
 from uavexp.store.study import STUDY, collect, study_text
 from uavexp.sweep import kernels
+from uavexp.sweep.agenda import Agenda, agenda_of
 from uavexp.sweep.audience import Audience
 from uavexp.sweep.dask import run_dask
 from uavexp.sweep.faults import reason_of
 from uavexp.sweep.head_start import PRELOAD
 from uavexp.sweep.job import Done, Job
 from uavexp.sweep.local import Watch, run_local, start_fork_server
-from uavexp.sweep.plan import Plan, plan_of
 from uavexp.sweep.runner import Backend, Runner, read_runner
-from uavexp.sweep.task import Task, files_of, fly_task, fly_task_elsewhere, version
+from uavexp.sweep.trial_job import TrialJob, files_of, fly_job, fly_job_elsewhere, version
 
 _WARM_UP_S = 3.0  # simulated: by then every kernel of a flight has been called
 
@@ -49,40 +49,40 @@ def execute(
         UavexpError: bad input, told before anything was written; or a full disk.
     """
     runner = read_runner(command.runner)
-    look = partial(plan_of, command, user_folder=user_folder, accept_other_code=runner.accept_other_code)
+    look = partial(agenda_of, command, user_folder=user_folder, accept_other_code=runner.accept_other_code)
     if runner.dry_run:
         folder = folder_of(command)
         audience.listing(look(folder), folder)
         return 0
     with opened(command) as folder:
-        plan = look(folder)
-        if plan.left:
-            _prepare(plan, runner, audience)
-        return _fly_plan(plan, command, audience, Run(typed=typed, how=runner.how), runner)
+        agenda = look(folder)
+        if agenda.left:
+            _prepare(agenda, runner, audience)
+        return _fly_agenda(agenda, command, audience, Run(typed=typed, how=runner.how), runner)
 
 
-def _prepare(plan: Plan, runner: Runner, audience: Audience) -> None:
+def _prepare(agenda: Agenda, runner: Runner, audience: Audience) -> None:
     """Have kernels compiled and the fork server started."""
     if not kernels.is_compiled():
         audience.say("first run: compiling kernels takes about a minute")
-        _compile_kernels(plan.left[0])
+        _compile_kernels(agenda.left[0])
     if runner.backend == Backend.LOCAL:
         start_fork_server([PRELOAD])
 
 
-def _fly_plan(plan: Plan, command: Command, audience: Audience, run: Run, runner: Runner) -> int:
-    folder, kept, failed = plan.study.folder, 0, 0
+def _fly_agenda(agenda: Agenda, command: Command, audience: Audience, run: Run, runner: Runner) -> int:
+    folder, kept, failed = agenda.study.folder, 0, 0
     with (
-        audience.progress(plan),
-        _worlds_checked(plan) as wait_for_worlds,
-        contextlib.closing(_fly(plan, runner, audience.watch)) as flying,
+        audience.progress(agenda),
+        _worlds_checked(agenda) as wait_for_worlds,
+        contextlib.closing(_fly(agenda, runner, audience.watch)) as flying,
     ):
         try:
             for done in flying:
                 if not kept:
                     wait_for_worlds()
-                    _refuse_bad_input(plan, done)
-                    _begin(plan, run)
+                    _refuse_bad_input(agenda, done)
+                    _begin(agenda, run)
                 _keep(folder, done)
                 kept += 1
                 failed += done.answer.status is not Status.OK
@@ -92,13 +92,13 @@ def _fly_plan(plan: Plan, command: Command, audience: Audience, run: Run, runner
                 if (folder / STUDY).exists():
                     run.note(folder, _ending(error, folder), kept, failed)
                     collect(folder)
-            audience.stopped(folder, kept, len(plan.left), again=bool(command.out or command.experiment))
+            audience.stopped(folder, kept, len(agenda.left), again=bool(command.out or command.experiment))
             raise
-    if not plan.left:
-        _begin(plan, run)
+    if not agenda.left:
+        _begin(agenda, run)
     rows = collect(folder)
     run.note(folder, "finished", kept, failed)
-    audience.flown(plan, rows)
+    audience.flown(agenda, rows)
     return 1 if failed else 0
 
 
@@ -109,13 +109,13 @@ def _ending(error: BaseException, folder: Path) -> str:
     return f"failed: {one_line(error).replace(str(folder), folder.name)}"
 
 
-def _fly(plan: Plan, runner: Runner, watch: Watch) -> Generator[Done, None, None]:
+def _fly(agenda: Agenda, runner: Runner, watch: Watch) -> Generator[Done, None, None]:
     """Fly what is left, each trial in a process of its own."""
-    workers = min(runner.workers, max(1, len(plan.left)))
+    workers = min(runner.workers, max(1, len(agenda.left)))
     if runner.backend == Backend.DASK:
         return run_dask(
-            fly_task_elsewhere,
-            plan.left,
+            fly_job_elsewhere,
+            agenda.left,
             address=runner.address,
             queue=runner.queue,
             n_jobs=workers,
@@ -123,22 +123,22 @@ def _fly(plan: Plan, runner: Runner, watch: Watch) -> Generator[Done, None, None
             preload=[PRELOAD],
             version=version,
         )
-    return run_local(fly_task, plan.left, n_jobs=workers, limits=runner.limits, watch=watch)
+    return run_local(fly_job, agenda.left, n_jobs=workers, limits=runner.limits, watch=watch)
 
 
-def _refuse_bad_input(plan: Plan, done: Done) -> None:
+def _refuse_bad_input(agenda: Agenda, done: Done) -> None:
     """End a command of one trial that cannot be flown as asked, before anything is kept."""
-    if len(plan.jobs) == 1 and done.answer.mendable:
+    if len(agenda.jobs) == 1 and done.answer.mendable:
         raise ConfigError(done.answer.reason.partition(": ")[2])
 
 
-def _begin(plan: Plan, run: Run) -> None:
+def _begin(agenda: Agenda, run: Run) -> None:
     """Say what the folder is about and who flies into it, and put away what was found broken in it."""
-    folder = plan.study.folder
+    folder = agenda.study.folder
     remove_unfinished(folder)
-    for name in plan.stock.damaged:
+    for name in agenda.stock.damaged:
         set_aside(folder, name)
-    write_text(folder / STUDY, study_text(plan.study))
+    write_text(folder / STUDY, study_text(agenda.study))
     run.note(folder, FLYING)
 
 
@@ -152,26 +152,26 @@ def _keep(folder: Path, done: Done) -> None:
 
 
 @contextlib.contextmanager
-def _worlds_checked(plan: Plan) -> Iterator[Callable[[], None]]:
+def _worlds_checked(agenda: Agenda) -> Iterator[Callable[[], None]]:
     """Check the worlds beside the first flights, of which none is kept before this has ended well."""
-    tasks = [job.payload for job in plan.left] if len(plan.jobs) > 1 else []
+    asked = [job.payload for job in agenda.left] if len(agenda.jobs) > 1 else []
     with ThreadPoolExecutor(max_workers=1) as pool:
-        yield pool.submit(_check_worlds, tasks).result
+        yield pool.submit(_check_worlds, asked).result
 
 
-def _check_worlds(tasks: Sequence[Task]) -> None:
+def _check_worlds(asked: Sequence[TrialJob]) -> None:
     """Make the first seed of each distinct world, so that a bad one is told before anything is kept."""
     checked: list[Any] = []
-    for task in tasks:
-        world = task.cell.config["world"], task.cell.config["world_seed"]
+    for trial in asked:
+        world = trial.cell.config["world"], trial.cell.config["world_seed"]
         if world not in checked:
             checked.append(world)
             try:
-                check_world(task.cell, task.seed)
+                check_world(trial.cell, trial.seed)
             except UavexpError:
                 raise
             except Exception as error:
-                raise ConfigError(f"world={task.cell.options['world']}: {reason_of(error)}") from error
+                raise ConfigError(f"world={trial.cell.options['world']}: {reason_of(error)}") from error
 
 
 def _compile_kernels(job: Job) -> None:
@@ -181,10 +181,10 @@ def _compile_kernels(job: Job) -> None:
     process.join()
 
 
-def _warm_up(task: Task) -> None:
+def _warm_up(trial: TrialJob) -> None:
     def stop(time_s: float, _: str) -> None:
         if time_s >= _WARM_UP_S:
             raise SystemExit
 
     with contextlib.suppress(Exception):  # the trial itself tells what is wrong
-        fly_cell(task.cell, task.seed, stop)
+        fly_cell(trial.cell, trial.seed, stop)

@@ -18,7 +18,7 @@ from uavexp.sweep.job import Answer, Job, Progress
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Task:
+class TrialJob:
     """One trial to fly; the payload of its job."""
 
     cell: Cell
@@ -40,15 +40,15 @@ class Flown:
     reason: str
 
 
-def fly_task(task: Task, progress: Progress) -> Flown:
+def fly_job(asked: TrialJob, progress: Progress) -> Flown:
     """Fly one trial and return its files; nothing is written here."""
     begin_s = time.perf_counter()
-    trial = fly_cell(task.cell, task.seed, progress)
-    wall = {"command": task.command, "wall_trial_s": time.perf_counter() - begin_s}
+    trial = fly_cell(asked.cell, asked.seed, progress)
+    wall = {"command": asked.command, "wall_trial_s": time.perf_counter() - begin_s}
     digest = trial.world.digest
-    known = is_whole(task.worlds / f"{digest}.npz")
+    known = is_whole(asked.worlds / f"{digest}.npz")
     return Flown(
-        files=trial_files(trial, {**task.identity, **task.version}, wall, _picture(trial, task.command)),
+        files=trial_files(trial, {**asked.identity, **asked.version}, wall, _picture(trial, asked.command)),
         world=(digest, None if known else world_bytes(trial.world)),
         outcome=str(trial.log.outcome),
         success=bool(trial.metrics["success"]),
@@ -70,22 +70,22 @@ def version() -> dict[str, Any]:
     return {"code": code_digest(), "lock": lock_digest()}
 
 
-def fly_task_elsewhere(task: Task, progress: Progress) -> Flown:
+def fly_job_elsewhere(asked: TrialJob, progress: Progress) -> Flown:
     """Fly one trial on a worker, which must run the version that the record will name.
 
     Raises:
         RecordError: it runs another one.
     """
-    if version() != task.version:
+    if version() != asked.version:
         raise RecordError("this Dask worker runs another version of uavexp than the command")
-    return fly_task(task, progress)
+    return fly_job(asked, progress)
 
 
 def files_of(job: Job, answer: Answer, wall_s: float) -> dict[str, bytes]:
     """Files that a trial leaves behind, flown or not."""
     if isinstance(answer.value, Flown):
         return answer.value.files
-    task: Task = job.payload
-    wall = {"command": task.command, "wall_trial_s": wall_s}
-    head = {**task.identity, **task.version}
+    asked: TrialJob = job.payload
+    wall = {"command": asked.command, "wall_trial_s": wall_s}
+    head = {**asked.identity, **asked.version}
     return failure_files(answer.status, answer.reason, answer.trace, head, wall)

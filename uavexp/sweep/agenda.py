@@ -15,11 +15,11 @@ from uavexp.store.records import cell_digest, trial_name
 from uavexp.store.resume import Stock, contains, join_studies, take_stock
 from uavexp.store.study import STUDY, WORLDS, Study, StudyCell, read_study
 from uavexp.sweep.job import Job
-from uavexp.sweep.task import Task, version
+from uavexp.sweep.trial_job import TrialJob, version
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Plan:
+class Agenda:
     """A command's trials against what its folder holds."""
 
     study: Study  # with the cells and seeds that were there before
@@ -37,9 +37,9 @@ class Plan:
         return sum(job.name in self.stock.failed for job in self.jobs)
 
 
-def plan_of(
+def agenda_of(
     command: Command, folder: Path, user_folder: Path | None = None, *, accept_other_code: bool = False
-) -> Plan:
+) -> Agenda:
     """Compare a command with its folder; nothing is written.
 
     Raises:
@@ -54,7 +54,7 @@ def plan_of(
         declared(study)  # a report that cannot be made is refused before the first flight
     if (folder / STUDY).exists():
         study = _joined(read_study(folder), study, command, user_folder)
-    return Plan(
+    return Agenda(
         study=study,
         jobs=_jobs(command, folder, identities, version(), user_folder),
         stock=take_stock(folder, version(), accept_other_code=accept_other_code),
@@ -109,7 +109,7 @@ def _jobs(
         Job(
             name=trial_name({**whole, "seed": seed}),
             label=f"{' '.join(cell.labels.values()) or cell.strategy} seed {seed}",
-            payload=Task(
+            payload=TrialJob(
                 cell=cell,
                 seed=seed,
                 identity={**whole, "seed": seed},
