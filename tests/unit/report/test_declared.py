@@ -16,7 +16,7 @@ from uavexp.errors import ConfigError
 from uavexp.report.contents import Report
 from uavexp.report.declared import declared
 from uavexp.store.study import Study
-from uavexp.sweep.plan import plan_of
+from uavexp.sweep.agenda import agenda_of
 
 ARMS = ("new", "old")
 
@@ -84,7 +84,7 @@ def test_what_does_not_exist_is_refused_before_the_first_flight(tmp_path: Path) 
     (folder / "bad.yaml").write_text("figures: [sucess]\naxes: {arm: {a: {strategy: mcr}}}")
     command = Composer(user_folder=tmp_path).command(parse_settings(["experiments=own/bad"]))
     with pytest.raises(ConfigError, match="did you mean 'success'"):
-        plan_of(command, tmp_path / "out", tmp_path)
+        agenda_of(command, tmp_path / "out", tmp_path)
 
 
 @pytest.mark.parametrize("name", sorted(list_experiments()))
