@@ -24,9 +24,9 @@ from uavexp.metrics.voxel_path import (
     height_reversals,
     mean_heading_change_rad,
 )
-from uavexp.planner.find.voxel.grid import VoxelGrid, VoxelPath
-from uavexp.planner.find.voxel.smoothing import smoothed
-from uavexp.planner.improved_astar import ImprovedAstar
+from uavexp.planner.find.turning import Turning
+from uavexp.planner.find.voxels.voxel_grid import VoxelGrid, VoxelPath
+from uavexp.planner.find.voxels.waypoints import smoothed
 from uavexp.seeding import Stream, generator
 from uavexp.world.multilevel import Multilevel
 from uavexp.world.voxel_model import inflate, voxel_model
@@ -103,13 +103,11 @@ def compare() -> None:
     grid = VoxelGrid(free)
     arms = {
         "plain": None,
-        "exact": ImprovedAstar(max_expansions=10**9, form="exact"),
-        "exact, open neighbours": ImprovedAstar(
-            max_expansions=10**9, form="exact", n_horizontal="neighbours"
-        ),
-        "exact, no rule": ImprovedAstar(max_expansions=10**9, form="exact", vertical_rule="none"),
-        "paper": ImprovedAstar(max_expansions=10**9, form="paper"),
-        "paper, no rule": ImprovedAstar(max_expansions=10**9, form="paper", vertical_rule="none"),
+        "exact": Turning(max_expansions=10**9, form="exact"),
+        "exact, open neighbours": Turning(max_expansions=10**9, form="exact", n_horizontal="neighbours"),
+        "exact, no rule": Turning(max_expansions=10**9, form="exact", vertical_rule="none"),
+        "paper": Turning(max_expansions=10**9, form="paper"),
+        "paper, no rule": Turning(max_expansions=10**9, form="paper", vertical_rule="none"),
     }
     rows: dict[str, list[list[float]]] = {name: [] for name in arms}
     for a, b in pairs(grid, voxel_m):

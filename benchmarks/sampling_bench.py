@@ -24,7 +24,10 @@ from uavexp.geometry import polyline_length_m
 from uavexp.mapping.known import Known
 from uavexp.planner.df_bitstar import DfBitstar
 from uavexp.planner.find.free_space import free_space
-from uavexp.planner.find.ompl_process import Query, search_with_ompl
+from uavexp.planner.find.ompl_server import Query, search_with_ompl
+from uavexp.planner.find.tree import Tree
+from uavexp.planner.shape.corridor_qp import CorridorQp
+from uavexp.planner.shape.waypoint_spline import WaypointSpline
 from uavexp.scene import Scene
 from uavexp.seeding import Stream, generator
 from uavexp.trajectory import evaluate
@@ -57,9 +60,9 @@ def request_in(world_name: str, seed: int) -> PlanRequest:
 
 def timed(request: PlanRequest, seed: int, repeats: int = 1, **parameters: Any) -> tuple[float, PlanResult]:
     """Least processor time of a plan of DF-BIT*, ms, and the plan."""
-    laps = []
+    laps, shape = [], parameters.pop("shape", CorridorQp())
     for _ in range(repeats):
-        planner = DfBitstar(**parameters)
+        planner = DfBitstar(find=Tree(**parameters), shape=shape)
         planner.reset(LIMITS, np.random.default_rng(seed))
         began_s = time.process_time()
         result = planner.plan(request)
@@ -71,7 +74,7 @@ def geometric(request: PlanRequest) -> float:
     """Ours against OMPL's to the same length; returns the shortest path of either."""
     ends = np.stack([request.position_m, request.goal.position_m])
     space = free_space(request.field, ends, request.flight_bounds_m, CLEARANCE_M, BAND_M, False)
-    plain = {"dynamics_filter": False, "smoothing": "waypoint_spline"}
+    plain = {"dynamics_filter": False, "shape": WaypointSpline()}
     rows, best = [], np.inf
     for seed in range(SEEDS):
         settings = {"setSamplesPerBatch": 100, "setRewireFactor": 1.1}
@@ -105,7 +108,7 @@ def best_of_any(request: PlanRequest, best_m: float) -> float:
     """The shortest path that any form finds in the time that is left of a minute of processor time."""
     began_s, seed = time.process_time(), 1000
     while time.process_time() - began_s < BEST_S:
-        _, result = timed(request, seed, batches=400, dynamics_filter=False, smoothing="waypoint_spline")
+        _, result = timed(request, seed, batches=400, dynamics_filter=False, shape=WaypointSpline())
         best_m, seed = min(best_m, float(result.history[-1, 1])), seed + 1
     return best_m
 

@@ -9,28 +9,37 @@ from __future__ import annotations
 import gc
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from uavexp.arrays import Float
-from uavexp.check.fields import bounds, field_from, warehouse
+from uavexp.check.fields import field_from, warehouse
+from uavexp.check.requests import ask
 from uavexp.geometry import polyline_length_m
+from uavexp.planner.constraints import Constraints
+from uavexp.planner.find.base import FoundPath
 from uavexp.planner.find.free_space import FreeSpace, free_space
-from uavexp.planner.find.grid import PathSearch
+from uavexp.planner.find.grid import Grid
+from uavexp.planner.movers.moving import MovingObstacles
 from uavexp.planner.shape.corridor import make_corridor
-from uavexp.planner.shape.corridor_qp import BsplineSmoother, Derivative
+from uavexp.planner.shape.corridor_qp import CorridorQp, Derivative
 from uavexp.planner.shape.quadratic import NO_CUTS, Problem, Solution, solve
 from uavexp.planner.shape.shortcut import shortcut
 from uavexp.planner.shape.timing import resample, smooth, time_profile
 from uavexp.planner.spline.clamped import make_basis
 from uavexp.trajectory import evaluate
-from uavexp.types import Goal, Limits, PlanRequest, PlanStatus
+from uavexp.types import Limits, PlanRequest, PlanStatus, Tracks
 
 LIMITS = Limits(
     max_speed_mps=5.0, max_acceleration_mps2=3.5, max_body_rate_radps=2.0, body_size_m=(0.32, 0.32, 0.12)
 )
 CLEARANCE_M, REPEATS, CONTROL_POINTS = 0.26, 5, 30
+KEPT = Constraints(
+    limits=LIMITS, min_clearance_m=CLEARANCE_M, safe_clearance_m=0.75, z_band_m=0.3, known_only=False
+)
+NO_MOVERS = MovingObstacles(tracks=Tracks.none(), body_radius_m=0.0, margin_m=0.0, horizon_s=0.0)
 
 
 def least_ms(work: Callable[[], object]) -> float:
@@ -50,32 +59,21 @@ def tasks(seeds: int, count: int) -> list[tuple[PlanRequest, Float]]:
     for seed in range(seeds):
         grid = warehouse(seed)
         field, rng = field_from(grid), np.random.default_rng(seed)
-        search = PathSearch(
-            min_clearance_m=CLEARANCE_M,
-            safe_clearance_m=0.75,
-            clearance_weight=2.0,
-            z_band_m=0.3,
-            known_only=False,
-            max_expansions=300_000,
-        )
+        search = Grid()
         wanted = len(made) + count
         while len(made) < wanted:
             ends = rng.uniform([1.0, 1.0, 1.1], [25.0, 15.0, 1.6], (2, 3))
             if field.distance_m(ends).min() < 0.4:
                 continue
-            found = search.find(field, ends[0], ends[1], bounds(grid))
+            request = replace(ask(field, *ends), time_s=0.0)
+            found = search.find(request, KEPT, rng)
             if found.status is PlanStatus.OK and 15.0 < polyline_length_m(found.path_m) < 28.0:
-                request = PlanRequest(
-                    time_s=0.0,
-                    position_m=ends[0],
-                    velocity_mps=np.zeros(3),
-                    acceleration_mps2=np.zeros(3),
-                    goal=Goal(position_m=ends[1], is_target=True, score=0.0),
-                    field=field,
-                    flight_bounds_m=bounds(grid),
-                )
                 made.append((request, found.path_m))
     return made
+
+
+def _way(path_m: Float) -> FoundPath:
+    return FoundPath(status=PlanStatus.OK, path_m=path_m)
 
 
 def qp_alone(request: PlanRequest, path_m: Float) -> tuple[Solution, float]:
@@ -122,11 +120,11 @@ def measure() -> dict[str, float]:
         np.median([spent / answer.solves for answer, spent in solved])
     )
     for kind in Derivative:
-        smoother, spent, stretch, over, ok = BsplineSmoother(derivative=kind), [], [], 0.0, 0
+        shaper, spent, stretch, over, ok = CorridorQp(derivative=kind), [], [], 0.0, 0
         least = np.inf
         for request, path in work:
-            result = smoother.smooth(request, path, None, LIMITS, CLEARANCE_M, False)
-            spent.append(least_ms(partial(smoother.smooth, request, path, None, LIMITS, CLEARANCE_M, False)))
+            result = shaper.shape(request, _way(path), KEPT, NO_MOVERS)
+            spent.append(least_ms(partial(shaper.shape, request, _way(path), KEPT, NO_MOVERS)))
             if result.trajectory is None:
                 continue
             ok += 1

@@ -13,14 +13,19 @@ from tests.folders import CONF as CONF
 
 def options(group: str) -> list[str]:
     """Names of all options of a group."""
-    return sorted(path.stem for path in (CONF / group).glob("*.yaml"))
+    return sorted(path.stem for path in CONF.joinpath(*group.split(".")).glob("*.yaml"))
 
 
 def build(group: str, option: str, **changes: Any) -> Any:
     """The component that an option's yaml describes, with the options of its group that it holds."""
-    values = OmegaConf.to_container(OmegaConf.load(CONF / group / f"{option}.yaml"))
-    for inner in values.pop("defaults", []):  # risk@policies.risk
-        part, _, place = inner.partition("@")
+    values = OmegaConf.to_container(OmegaConf.load(CONF.joinpath(*group.split("."), f"{option}.yaml")))
+    for inner in values.pop("defaults", []):  # risk@policies.risk, find: grid, _self_
+        if isinstance(inner, dict):
+            values |= {held: build(f"{group}.{held}", part) for held, part in inner.items()}
+            continue
+        part, at, place = inner.partition("@")
+        if not at:
+            continue
         parameter, name = place.split(".")
         values[parameter][name] = build(group, part)
     return get_class(values.pop("_target_"))(**(values | changes))

@@ -6,6 +6,7 @@ Options are found by glob: a new planner is one .py and one .yaml, and no edit h
 from __future__ import annotations
 
 import dataclasses
+import functools
 import importlib
 import inspect
 import re
@@ -19,6 +20,7 @@ from uavexp.config.build import (
     TARGET,
     build_component,
     component_class,
+    nested_groups,
     protocol_members,
     protocol_of,
     top_level,
@@ -32,7 +34,15 @@ from uavexp.paths import PACKAGE, conf_folder
 from uavexp.trial import Parts
 
 CONF = conf_folder()
-OPTIONS = sorted((file.parent.name, file.stem) for group in GROUPS for file in (CONF / group).glob("*.yaml"))
+
+
+def folder_of(root: Path, group: str) -> Path:
+    return root.joinpath(*group.split("."))
+
+
+HELD = sorted(".".join(folder.relative_to(CONF).parts) for folder in CONF.glob("*/*/"))  # by an option
+ALL_GROUPS = (*GROUPS, *HELD)
+OPTIONS = sorted((group, file.stem) for group in ALL_GROUPS for file in folder_of(CONF, group).glob("*.yaml"))
 PRESETS = sorted(file.stem for file in (CONF / PRESET_GROUP).glob("*.yaml"))
 COMPOSER = Composer()
 
@@ -41,7 +51,7 @@ SHARED = yaml.safe_load((CONF / "config.yaml").read_text())  # keys that options
 
 
 def load(group: str, option: str) -> dict[str, object]:
-    tree = dict(yaml.safe_load((CONF / group / f"{option}.yaml").read_text()))
+    tree = dict(yaml.safe_load((folder_of(CONF, group) / f"{option}.yaml").read_text()))
     tree.pop("defaults", None)  # options of its group that it holds
     references = {key: re.fullmatch(r"\$\{(\w+)\}", str(value)) for key, value in tree.items()}
     return {key: SHARED[match[1]] if (match := references[key]) else tree[key] for key in tree}
@@ -54,7 +64,7 @@ def values(tree: dict[str, object]) -> dict[str, object]:
 def test_every_group_is_a_folder_a_package_and_a_role_of_a_trial() -> None:
     folders = {item.name for item in CONF.iterdir() if item.is_dir()}
     assert folders == {*GROUPS, PRESET_GROUP, RUNNER_GROUP}
-    assert all((PACKAGE / group / "base.py").is_file() for group in GROUPS)
+    assert all((folder_of(PACKAGE, group) / "base.py").is_file() for group in ALL_GROUPS)
     assert [item.name for item in dataclasses.fields(Parts)] == [*GROUPS, *top_level()]
 
 
@@ -75,7 +85,7 @@ def test_the_yaml_of_every_option_is_what_make_conf_writes() -> None:
         assert path.read_text(encoding="utf-8") == text, "make conf"
 
 
-@pytest.mark.parametrize("group", GROUPS)
+@pytest.mark.parametrize("group", ALL_GROUPS)
 def test_a_base_module_defines_one_protocol_with_members(group: str) -> None:
     assert protocol_of(group).__module__ == f"uavexp.{group}.base"
     assert protocol_members(group)
@@ -94,7 +104,8 @@ def test_yaml_and_class_have_the_same_parameters_and_defaults(group: str, option
     tree = load(group, option)
     cls = component_class(group, str(tree[TARGET]))
     annotations = parameter_types(cls)
-    assert list(values(tree)) == list(annotations), "same names in the same order"
+    own = [name for name in annotations if name in tree or name not in nested_groups(cls)]
+    assert list(values(tree)) == own, "same names in the same order"
     for name, value in values(tree).items():
         if value == MISSING:
             assert name in required_parameters(cls)
@@ -108,14 +119,18 @@ def test_yaml_and_class_have_the_same_parameters_and_defaults(group: str, option
 
 @pytest.mark.parametrize(("group", "option"), OPTIONS)
 def test_every_parameter_has_a_comment(group: str, option: str) -> None:
-    bare = [item.name for item in read_option(CONF / group / f"{option}.yaml").parameters if not item.comment]
+    bare = [
+        item.name
+        for item in read_option(folder_of(CONF, group) / f"{option}.yaml").parameters
+        if not item.comment
+    ]
     assert not bare
 
 
 @pytest.mark.parametrize(("group", "option"), OPTIONS)
 def test_every_dimensional_parameter_states_its_unit(group: str, option: str) -> None:
     suffixes = {"_m": "m", "_s": "s", "_mps": "m/s", "_mps2": "m/s²", "_hz": "Hz", "_deg": "deg", "_px": "px"}
-    for item in read_option(CONF / group / f"{option}.yaml").parameters:
+    for item in read_option(folder_of(CONF, group) / f"{option}.yaml").parameters:
         for suffix, unit in suffixes.items():
             if item.name.endswith(suffix) and "_per_" not in item.name:
                 stated = unit in re.split(r"[\s,;:()]+", item.comment.replace("m/s^2", "m/s²"))
@@ -131,8 +146,10 @@ def test_every_option_composes_and_builds(group: str, option: str, tmp_path: Pat
         file.touch()
         settings.append(Setting(key=f"{group}.{name}", values=(str(file),)))
     cell = COMPOSER.cell(settings)
-    assert cell.options[group] == option
-    component = build_component(group, cell.config[group])
+    assert cell.options.get(group, option) == option
+    config = functools.reduce(lambda part, key: part[key], group.split("."), cell.config)
+    assert config[TARGET] == tree[TARGET]
+    component = build_component(group, config)
     for name in parameter_types(type(component)):
         assert hasattr(component, name)
 
@@ -180,9 +197,9 @@ def test_presets_differ_in_the_trigger_and_in_the_goal_of_a_single_shot_only() -
 
 
 def test_every_module_with_a_component_has_its_yaml() -> None:
-    for group in GROUPS:
+    for group in ALL_GROUPS:
         members = protocol_members(group)
-        for file in sorted((PACKAGE / group).glob("*.py")):
+        for file in sorted(folder_of(PACKAGE, group).glob("*.py")):
             if file.stem in ("__init__", "base") or (group, file.stem) in OPTIONS:
                 continue
             module = importlib.import_module(f"uavexp.{group}.{file.stem}")
@@ -191,7 +208,7 @@ def test_every_module_with_a_component_has_its_yaml() -> None:
                 for item in vars(module).values()
                 if inspect.isclass(item)
                 and item.__module__ == module.__name__
-                and not inspect.isabstract(item)
+                and not (inspect.isabstract(item) or item.__subclasses__())
                 and all(hasattr(item, name) for name in members)
             ]
             assert not components, (

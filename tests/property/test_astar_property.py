@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.voxel_paths import is_path, random_grid, shortest
-from uavexp.planner.find.voxel.grid import VoxelGrid
-from uavexp.planner.improved_astar import Form, HorizontalCount, ImprovedAstar, VerticalRule
+from uavexp.planner.find.turning import Form, HorizontalCount, Turning, VerticalRule
+from uavexp.planner.find.voxels.voxel_grid import VoxelGrid
 
 SHAPES = st.tuples(st.integers(1, 7), st.integers(1, 7), st.integers(1, 7))
 
@@ -29,8 +29,8 @@ def test_plain_is_exact_and_symmetric(seed: int, shape: tuple[int, int, int], de
 
 def test_improved_solves_every_solvable_query_of_thousands() -> None:
     rng = np.random.default_rng(11)
-    planners = [
-        ImprovedAstar(form=form, vertical_rule=rule, n_horizontal=count)
+    finders = [
+        Turning(form=form, vertical_rule=rule, n_horizontal=count)
         for form in Form
         for rule in VerticalRule
         for count in HorizontalCount
@@ -40,8 +40,8 @@ def test_improved_solves_every_solvable_query_of_thousands() -> None:
         shape = tuple(int(v) for v in rng.integers(2, 9, 3))
         free, start, goal = random_grid(rng, shape, float(rng.uniform(0.0, 0.6)))
         grid, ends = VoxelGrid(free), (np.array(start), np.array(goal))
-        planner = planners[n % len(planners)]
-        answer, remark = planner.search(grid, *ends, planner.wish(0.1))
+        finder = finders[n % len(finders)]
+        answer, remark = finder.search(grid, *ends, finder.wish(0.1))
         plain = grid.shortest(*ends)
         assert answer.found == plain.found
         if answer.found:

@@ -7,15 +7,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uavexp.check.fields import bounds, box, empty, field_from
-from uavexp.planner.df_bitstar import DfBitstar, Edges
-from uavexp.planner.find.tree.motion import cubic_time, least_time
+from uavexp.planner.df_bitstar import DfBitstar
+from uavexp.planner.find.batch_tree.cubic_motion import cubic_time, least_time
+from uavexp.planner.find.tree import Edges, Tree
 from uavexp.trajectory import evaluate
 from uavexp.types import Goal, Limits, PlanRequest, PlanStatus
 
 LIMITS = Limits(
     max_speed_mps=2.5, max_acceleration_mps2=2.5, max_body_rate_radps=2.0, body_size_m=(0.32, 0.32, 0.12)
 )
-PLANNERS = {edges: DfBitstar(edges=edges, first_batches=8, batches=3, guide_batches=3) for edges in Edges}
+PLANNERS = {
+    edges: DfBitstar(find=Tree(edges=edges, first_batches=8, batches=3, guide_batches=3)) for edges in Edges
+}
 for planner in PLANNERS.values():
     planner.reset(LIMITS, np.random.default_rng(0))
 

@@ -108,16 +108,23 @@ def build_component(group: str, tree: Mapping[str, Any], path: str = "") -> Any:
 
     Args:
         group: whose protocol it must speak.
-        tree: `_target_` and parameters; a parameter of type dict[str, P], P a group's protocol, holds
-            named trees of that group.
+        tree: `_target_` and parameters; a parameter of type P or dict[str, P], P a group's protocol,
+            holds a tree of that group, or several by name.
         path: where the tree stands, for messages; the group when it is not told.
     """
     path = path or group
     cls = component_class(group, tree[TARGET])
     arguments = _arguments(group, tree, path)
     for key, inner in nested_groups(cls).items():
-        parts = arguments.get(key, {}).items()
-        arguments[key] = {name: build_component(inner, part, f"{path}.{key}.{name}") for name, part in parts}
+        if key not in arguments:
+            continue
+        if TARGET in arguments[key]:
+            arguments[key] = build_component(inner, arguments[key], f"{path}.{key}")
+        else:
+            parts = arguments[key].items()
+            arguments[key] = {
+                name: build_component(inner, part, f"{path}.{key}.{name}") for name, part in parts
+            }
     try:
         component = cls(**arguments)
     except UavexpError as error:
@@ -134,13 +141,13 @@ def build_component(group: str, tree: Mapping[str, Any], path: str = "") -> Any:
 
 @functools.cache
 def nested_groups(cls: type) -> dict[str, str]:
-    """Parameters that hold named components (annotated dict[str, P]), and the group whose protocol P is."""
+    """Parameters that hold components (annotated P or dict[str, P]), and the group whose protocol P is."""
     found = {}
     for name, annotation in parameter_types(cls).items():
-        key_and_value = get_args(annotation) if get_origin(annotation) is dict else (None, None)
-        group = next((group for group in GROUPS if key_and_value[1] is protocol_of(group)), None)
-        if key_and_value[0] is str and group is not None:
-            found[name] = group
+        held = get_args(annotation)[1] if get_origin(annotation) is dict else annotation
+        package, _, module = getattr(held, "__module__", "").rpartition(".")
+        if getattr(held, "_is_protocol", False) and module == "base":
+            found[name] = package.removeprefix("uavexp.")
     return found
 
 
@@ -211,17 +218,19 @@ def _arguments(group: str, tree: Mapping[str, Any], path: str) -> dict[str, Any]
             raise ConfigError(f"{path}.{key} must be given: type {path}.{key}=VALUE")
     nested = nested_groups(cls)
     return {
-        key: _named_trees(nested[key], value, f"{path}.{key}")
+        key: _held_trees(nested[key], value, f"{path}.{key}")
         if key in nested
         else check_value(f"{path}.{key}", value, allowed[key])
         for key, value in given.items()
     }
 
 
-def _named_trees(group: str, trees: Any, path: str) -> dict[str, Any]:
-    """Checked trees of the components of a group that stand inside another one."""
+def _held_trees(group: str, trees: Any, path: str) -> dict[str, Any]:
+    """Checked tree of the component of a group that another one holds, or trees of several, by name."""
     if not isinstance(trees, Mapping):
-        raise ConfigError(f"{path} must be named components of {group}, got {trees!r}")
+        raise ConfigError(f"{path} must be one of {group}, or several by name, got {trees!r}")
+    if TARGET in trees:
+        return _checked_tree(group, trees, path)
     for name, tree in trees.items():
         if not isinstance(tree, Mapping) or TARGET not in tree:
             raise ConfigError(f"{path}.{name} must be a component of {group} with {TARGET}, got {tree!r}")
@@ -245,8 +254,9 @@ def _with_inner(path: str, part: Any) -> Iterator[tuple[str, Any]]:
     yield path, part
     cls: type = type(part)
     for key in nested_groups(cls):
-        for name, inner in getattr(part, key).items():
-            yield from _with_inner(f"{path}.{key}.{name}", inner)
+        held = getattr(part, key)
+        for name, inner in held.items() if isinstance(held, dict) else (("", held),):
+            yield from _with_inner(f"{path}.{key}.{name}".rstrip("."), inner)
 
 
 def _told(path: str, cls: type, error: UavexpError) -> ConfigError:

@@ -23,14 +23,15 @@ from typing import Any
 
 import yaml  # type: ignore[import-untyped]
 
-from uavexp.config.build import GROUPS, TARGET, component_class
+from uavexp.config.build import GROUPS, TARGET, component_class, nested_groups
 from uavexp.parameters import MISSING, Unknown, is_option, parameter_types, plain
 from uavexp.paths import PACKAGE, conf_folder
 
 
 def option_files() -> dict[Path, str]:
     """Path and text of the yaml of every option of the package."""
-    classes = [cls for group in GROUPS for cls in _options(group)]
+    held = [f"{base.parent.parent.name}.{base.parent.name}" for base in PACKAGE.glob("*/*/base.py")]
+    classes = [cls for group in (*GROUPS, *held) for cls in _options(group)]
     return {_place(cls): option_yaml(cls) for cls in classes}
 
 
@@ -44,15 +45,26 @@ def parameter_lines(cls: type) -> list[str]:
     """`name: default  # comment` of every parameter of a dataclass."""
     bases = [base for base in reversed(cls.__mro__) if dataclasses.is_dataclass(base)]
     said = {name: text for base in bases for name, text in _comments(base).items() if text}
-    fields = [item for item in dataclasses.fields(cls) if item.init]
+    fields = [item for item in dataclasses.fields(cls) if item.init and item.name not in _held(cls)]
     return [f"{item.name}: {_default(cls, item)}  # {said.get(item.name, '')}".rstrip() for item in fields]
 
 
 def _defaults_list(cls: type) -> list[str]:
-    """What an option brings with it: its class's `defaults_list` with the comment there."""
+    """What an option brings with it: what it holds, or its class's `defaults_list` with the comment there."""
     items: tuple[str, ...] = getattr(cls, "defaults_list", ())
     head = [f"# {_comments(cls)['defaults_list']}", "defaults:"] if items else []
+    if held := _held(cls):
+        head, items = ["defaults:"], (*(f"{name}: {option}" for name, option in held.items()), "_self_")
     return head + [f"  - {item}" for item in items]
+
+
+def _held(cls: type) -> dict[str, str]:
+    """Parameters that hold one option of another group each, and which by default."""
+    factories = {item.name: item.default_factory for item in dataclasses.fields(cls)}
+    modules = {name: getattr(factories[name], "__module__", "") for name in nested_groups(cls)}
+    return {
+        name: module.rpartition(".")[2] for name, module in modules.items() if module.startswith("uavexp.")
+    }
 
 
 def _default(cls: type, item: dataclasses.Field[Any]) -> str:
@@ -83,7 +95,9 @@ def _comments(cls: type) -> dict[str, str]:
 
 
 def _options(group: str) -> list[type]:
-    names = [f"uavexp.{group}.{file.stem}" for file in sorted((PACKAGE / group).glob("*.py"))]
+    names = [
+        f"uavexp.{group}.{file.stem}" for file in sorted(PACKAGE.joinpath(*group.split(".")).glob("*.py"))
+    ]
     modules = [importlib.import_module(name) for name in names]
     return [
         item
@@ -94,8 +108,8 @@ def _options(group: str) -> list[type]:
 
 
 def _place(cls: type) -> Path:
-    _, group, name = cls.__module__.split(".")
-    return conf_folder() / group / f"{name}.yaml"
+    _, *group, name = cls.__module__.split(".")
+    return conf_folder().joinpath(*group, f"{name}.yaml")
 
 
 if __name__ == "__main__":

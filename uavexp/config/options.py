@@ -41,7 +41,7 @@ def user_folder(path: str) -> Path:
 
 
 def list_options(folders: Sequence[Path]) -> dict[str, dict[str, Path]]:
-    """Yaml file of every option of every group.
+    """Yaml file of every option of every group; those that a planner holds are groups like planner.find.
 
     Raises:
         ConfigError: a user's folder has an option whose name is taken (the shipped one
@@ -49,10 +49,11 @@ def list_options(folders: Sequence[Path]) -> dict[str, dict[str, Path]]:
     """
     found: dict[str, dict[str, Path]] = {}
     for folder in folders:
-        for file in sorted(folder.glob("*/*.yaml")):
-            options = found.setdefault(file.parent.name, {})
+        for file in sorted([*folder.glob("*/*.yaml"), *folder.glob("*/*/*.yaml")]):
+            group = ".".join(file.parent.relative_to(folder).parts)
+            options = found.setdefault(group, {})
             if file.stem in options:
-                raise ConfigError(f"{file}: {file.parent.name}={file.stem} exists already; rename yours")
+                raise ConfigError(f"{file}: {group}={file.stem} exists already; rename yours")
             options[file.stem] = file
     return found
 

@@ -41,7 +41,7 @@ class Trees:
         None where an option touches more than its own group, or the preset touches that group.
         """
         preset = {group: option for group, option in chosen.items() if group in (PRESET_GROUP, TRIGGER_GROUP)}
-        if preset == chosen:
+        if preset == chosen or any("." in group for group in chosen):
             return None
         plain = self.of({})
         tree = copy.deepcopy(self.of(preset))
@@ -56,7 +56,7 @@ class Trees:
         return tree
 
     def _compose(self, chosen: Mapping[str, str]) -> dict[str, Any]:
-        arguments = [f"{group}={name}" for group, name in chosen.items()]
+        arguments = [f"{group.replace('.', '/')}={name}" for group, name in chosen.items()]
         if TRIGGER_GROUP in chosen and PRESET_GROUP not in chosen:
             arguments.append(f"~{PRESET_GROUP}")  # the default preset's name would be wrong
         tree = self._tree(arguments)

@@ -2,26 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import field
 
-from uavexp.planner.find.ompl_planner import OmplPlanner
-from uavexp.planner.find.sampling import require_whole
+from uavexp.parameters import option
+from uavexp.planner.find.base import Finder
+from uavexp.planner.find.ompl_bitstar import OmplBitstar
+from uavexp.planner.find_and_shape import FindAndShape
+from uavexp.planner.shape.base import Shaper
+from uavexp.planner.shape.corridor_qp import CorridorQp
 
 
-@dataclass(slots=True, kw_only=True)
-class Bitstar(OmplPlanner):
-    """OMPL's BITstar on the project's free space, smoothed."""
+@option
+class Bitstar(FindAndShape):
+    """`find=ompl_bitstar` and `shape=corridor_qp`."""
 
-    algorithm: ClassVar[str] = "BITstar"
-    option: ClassVar[str] = "bitstar"
-
-    batch_samples: int = 100
-
-    def __post_init__(self) -> None:
-        OmplPlanner.__post_init__(self)
-        require_whole(batch_samples=self.batch_samples)
-
-    def settings(self) -> dict[str, float]:
-        """OMPL's setters and what they are given."""
-        return {"setSamplesPerBatch": self.batch_samples, "setRewireFactor": self.rewire_factor}
+    find: Finder = field(default_factory=OmplBitstar)
+    shape: Shaper = field(default_factory=CorridorQp)

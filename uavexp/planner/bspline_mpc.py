@@ -25,13 +25,17 @@ All budgets are iterations; the answer depends on the trial's requests so far an
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field, replace
+from copy import deepcopy
+from dataclasses import field, replace
+from typing import Annotated
 
 import numpy as np
 
-from uavexp.errors import require, require_non_negative, require_positive
+from uavexp.errors import require
+from uavexp.parameters import Count, NonNegative, Positive, PositiveShare, Unknown, between, option
 from uavexp.planner.constraints import Constraints
-from uavexp.planner.find.grid import PathSearch
+from uavexp.planner.find.base import Finder
+from uavexp.planner.find.grid import Grid
 from uavexp.planner.movers.escape import stops
 from uavexp.planner.movers.moving import MovingObstacles
 from uavexp.planner.mpc.follow import SLACK_M, Followed, Follower, least_room_m
@@ -41,95 +45,72 @@ from uavexp.planner.shape.static_spline import StaticSpline
 from uavexp.types import Limits, PlanRequest, PlanResult, PlanStatus, Tracks
 
 
-@dataclass(slots=True, kw_only=True)
+@option
 class BsplineMpc:
     """Static B-spline planner and dynamic MPC planner of paper 3; see the module."""
 
-    order: int = 4
-    stop_at_ends: bool = False
-    control_weight: float = 1.0
-    smooth_weight: float = 0.01
-    static_weight: float = 60.0
-    min_clearance_m: float = 0.26
-    safe_clearance_m: float = 0.75
-    end_speed_mps: float = 1.5
-    duration_margin: float = 1.1
-    control_spacing_m: float = 0.6
-    first_iterations: int = 3
-    final_iterations: int = 4
-    path_clearance_weight: float = 2.0
-    z_band_m: float = 0.3
-    unknown: str = "optimistic"
-    max_expansions: int = 300_000
-    horizon_steps: int = 20
-    horizon_step_s: float = 0.1
-    velocity_weight: float = 0.3
-    terminal_weight: float = 5.0
-    input_weight: float = 0.01
-    horizon_iterations: int = 2
-    keep_within_m: float = 0.5
-    mover_margin_m: float = 0.5
-    mover_horizon_s: float = 2.0
-    turn_share: float = 0.5
+    find: Finder = field(default_factory=Grid)
+    order: Annotated[int, between(4, 8)] = 4  # k of the spline, degree k - 1; the first and last k - 1
+    # control points are fixed (paper 3); 4 is the least with continuous acceleration
+    stop_at_ends: bool = False  # true: repeated control points, a stop at every goal (paper 3); false:
+    # continuous with the present motion [ours]
+    control_weight: Positive = 1.0  # 1, alpha_control of the integral of squared acceleration; the paper
+    # gives no number
+    smooth_weight: NonNegative = 0.01  # s², alpha_smooth of the integral of squared jerk [ours]
+    static_weight: NonNegative = 60.0  # m²/s⁴, alpha_static: what a surface's touch is worth as a squared
+    # acceleration [ours]
+    min_clearance_m: Positive = 0.26  # m, hard limit on the mapped distance of the body centre: its circle
+    # of 0.226 m and a third of a voxel [ours]
+    safe_clearance_m: Positive = 0.75  # m, obstacle cost and path penalty vanish beyond it [ours]
+    end_speed_mps: NonNegative = 1.5  # m/s, speed at a goal that is not the target, if there is room to
+    # stop behind it [ours]
+    duration_margin: Annotated[float, between(1, 10)] = 1.1  # 1, factor on the time-optimal traversal of
+    # the curve [ours]
+    control_spacing_m: Positive = 0.6  # m, path length per control point [ours]
+    first_iterations: Count = 3  # QPs of the spline before the curve is timed anew [ours]
+    final_iterations: Count = 4  # QPs at most after that, and after each stretching of the duration [ours]
+    z_band_m: NonNegative = 0.3  # m, the path may leave the heights between start and goal by this much
+    # [ours]
+    unknown: Unknown = Unknown.OPTIMISTIC  # optimistic: unknown space is free; conservative: it is not
+    # entered
+    horizon_steps: Annotated[int, between(2, 60)] = 20  # N of the horizon (paper 3 gives none): with
+    # horizon_step_s as long as predictions count [ours]
+    horizon_step_s: Positive = 0.1  # s, dt; at 2.5 m/s the vehicle and a walker come 0.4 m closer in it
+    # [ours]
+    velocity_weight: NonNegative = 0.3  # s², of the velocity in the deviation from the reference [ours]
+    terminal_weight: Positive = 5.0  # 1, factor on the last step's deviation: the way back to the spline
+    # stays short [ours]
+    input_weight: Positive = 0.01  # s⁴, lambda_u; the paper gives none
+    horizon_iterations: Annotated[int, between(1, 20)] = 2  # QPs of the horizon, each linearised around the
+    # one before [ours]
+    keep_within_m: NonNegative = 0.5  # m, farther from the static spline than this it is planned anew
+    # [ours]
+    mover_margin_m: NonNegative = 0.5  # m, beyond the body's circle, kept from predicted movers, which grow
+    # by their uncertainty [ours]
+    mover_horizon_s: NonNegative = 2.0  # s, predictions count for so long; stopping from 2.5 m/s takes 1.2
+    # s; 0: movers do not count [ours]
+    turn_share: PositiveShare = 0.5  # of the body rate limit, with which the horizon turns the thrust; the
+    # rest is left to the controller and the yaw [ours]
     slackened: int = field(default=0, init=False)  # requests at which the horizon gave way
     braked: int = field(default=0, init=False)  # requests at which only coming to rest was left
     _follower: Follower | None = field(default=None, init=False, repr=False)
     _guide: Guide | None = field(default=None, init=False, repr=False)
 
     def __post_init__(self) -> None:
-        require_positive(
-            control_weight=self.control_weight,
-            min_clearance_m=self.min_clearance_m,
-            safe_clearance_m=self.safe_clearance_m,
-            control_spacing_m=self.control_spacing_m,
-            horizon_step_s=self.horizon_step_s,
-            terminal_weight=self.terminal_weight,
-            input_weight=self.input_weight,
-        )
-        require_non_negative(
-            smooth_weight=self.smooth_weight,
-            static_weight=self.static_weight,
-            end_speed_mps=self.end_speed_mps,
-            path_clearance_weight=self.path_clearance_weight,
-            z_band_m=self.z_band_m,
-            velocity_weight=self.velocity_weight,
-            keep_within_m=self.keep_within_m,
-            mover_margin_m=self.mover_margin_m,
-            mover_horizon_s=self.mover_horizon_s,
-        )
         require(
             self.safe_clearance_m > self.min_clearance_m,
             f"safe_clearance_m must be > min_clearance_m {self.min_clearance_m}, got {self.safe_clearance_m}",
         )
-        require(
-            1.0 <= self.duration_margin <= 10.0,
-            f"duration_margin must be in [1, 10], got {self.duration_margin}",
-        )
-        require(0.0 < self.turn_share <= 1.0, f"turn_share must be in (0, 1], got {self.turn_share}")
-        whole = {"order": (4, 8), "horizon_steps": (2, 60), "horizon_iterations": (1, 20)}
-        whole |= dict.fromkeys(("first_iterations", "final_iterations", "max_expansions"), (1, 10**9))
-        for name, (least, most) in whole.items():
-            value = getattr(self, name)
-            require(
-                isinstance(value, int) and not isinstance(value, bool) and least <= value <= most,
-                f"{name} must be a whole number in [{least}, {most}], got {value!r}",
-            )
-        require(
-            self.unknown in ("optimistic", "conservative"),
-            f"unknown must be optimistic or conservative, got {self.unknown!r}",
-        )
 
     def reset(self, limits: Limits, rng: np.random.Generator) -> None:
-        """Begin a trial of a vehicle with these limits; draws nothing."""
-        del rng
+        """Begin a trial of a vehicle with these limits; every request draws from the same stream."""
         self._guide, self.slackened, self.braked = None, 0, 0
-        known_only = self.unknown == "conservative"
         constraints = Constraints(
             limits=limits,
             min_clearance_m=self.min_clearance_m,
             safe_clearance_m=self.safe_clearance_m,
             z_band_m=self.z_band_m,
-            known_only=known_only,
+            known_only=self.unknown is Unknown.CONSERVATIVE,
         )
         shaper = StaticSpline(
             order=self.order,
@@ -143,17 +124,9 @@ class BsplineMpc:
             first_iterations=self.first_iterations,
             final_iterations=self.final_iterations,
         )
-        search = PathSearch(
-            min_clearance_m=self.min_clearance_m,
-            safe_clearance_m=self.safe_clearance_m,
-            clearance_weight=self.path_clearance_weight,
-            z_band_m=self.z_band_m,
-            known_only=known_only,
-            max_expansions=self.max_expansions,
-        )
         weights = (self.velocity_weight, self.terminal_weight, self.input_weight)
         self._follower = Follower(
-            static=StaticPlanner(search=search, shaper=shaper, constraints=constraints),
+            static=StaticPlanner(search=self.find, shaper=shaper, constraints=constraints, rng=deepcopy(rng)),
             model=horizon_model(self.horizon_steps, self.horizon_step_s, *weights),
             iterations=self.horizon_iterations,
             limits=replace(limits, max_body_rate_radps=self.turn_share * limits.max_body_rate_radps),

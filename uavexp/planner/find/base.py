@@ -27,6 +27,7 @@ class FoundPath:
     checks: int = 0  # looks at the map
     history: Float = field(default_factory=lambda: np.zeros((0, 2)))  # (K, 2) iteration and best cost
     tree_m: Float = field(default_factory=lambda: np.zeros((0, 2, 3)))  # (E, 2, 3) edges
+    wall_s: float | None = None  # of the search, where that is not the time of the call
 
 
 class Finder(Protocol):

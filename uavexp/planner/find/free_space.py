@@ -17,7 +17,9 @@ import numpy as np
 
 from uavexp.arrays import Float, Float32, UInt8
 from uavexp.field import DistanceField
-from uavexp.planner.find.tree.motion import cubic_coefficients
+from uavexp.planner.constraints import Constraints
+from uavexp.planner.find.batch_tree.cubic_motion import cubic_coefficients
+from uavexp.types import PlanRequest
 
 _RESERVE_VOXELS = 0.25
 _LEAST_STEP_VOXELS = 0.25
@@ -41,6 +43,13 @@ class FreeSpace(NamedTuple):
     end_limit_m: Float  # (2,) least clearance next to them
     end_reach_m: Float  # (2,) how far "next to" goes
     least_step_m: float  # between two looks
+
+
+def space_of(request: PlanRequest, constraints: Constraints) -> FreeSpace:
+    """Free space of a request."""
+    ends = np.stack([request.position_m, request.goal.position_m])
+    kept = (constraints.min_clearance_m, constraints.z_band_m, constraints.known_only)
+    return free_space(request.field, ends, request.flight_bounds_m, *kept)
 
 
 def free_space(

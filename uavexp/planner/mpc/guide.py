@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from copy import deepcopy
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -12,8 +13,7 @@ from uavexp.arrays import Float
 from uavexp.braking import braking_trajectory
 from uavexp.planner.clearance import shortfall
 from uavexp.planner.constraints import Constraints
-from uavexp.planner.find.base import FoundPath
-from uavexp.planner.find.grid import PathSearch
+from uavexp.planner.find.base import Finder
 from uavexp.planner.movers.moving import MovingObstacles
 from uavexp.planner.shape.excess import instants
 from uavexp.planner.shape.start import REST_MPS, refusal, state_of
@@ -41,9 +41,10 @@ class Guide(NamedTuple):
 class StaticPlanner:
     """A* path, then the spline; from a moving start that defeats it, brakes first."""
 
-    search: PathSearch
+    search: Finder
     shaper: StaticSpline
     constraints: Constraints
+    rng: np.random.Generator
 
     def plan(self, request: PlanRequest) -> PlanResult:
         """Return a trajectory among static obstacles or the reason why there is none."""
@@ -71,11 +72,11 @@ class StaticPlanner:
 
     def _attempt(self, request: PlanRequest) -> PlanResult:
         """Search and shape once."""
-        began, goal_m = time.perf_counter(), request.goal.position_m
+        began = time.perf_counter()
         reason = refusal(state_of(request), self.constraints.limits)
         if reason:
             return PlanResult(status=PlanStatus.LIMITS, reason=reason)
-        found = self.search.find(request.field, request.position_m, goal_m, request.flight_bounds_m)
+        found = self.search.find(request, self.constraints, deepcopy(self.rng))
         searched = time.perf_counter()
         if found.status is not PlanStatus.OK:
             return PlanResult(
@@ -84,8 +85,7 @@ class StaticPlanner:
                 expansions=found.expansions,
                 wall_search_s=searched - began,
             )
-        way = FoundPath(status=found.status, path_m=found.path_m)
-        shaped = self.shaper.shape(request, way, self.constraints, _NO_MOVERS)
+        shaped = self.shaper.shape(request, found, self.constraints, _NO_MOVERS)
         return PlanResult(
             status=shaped.status,
             trajectory=shaped.trajectory,

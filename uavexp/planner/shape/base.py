@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
-from uavexp.arrays import Float
 from uavexp.planner.constraints import Constraints
 from uavexp.planner.find.base import FoundPath
 from uavexp.planner.movers.moving import MovingObstacles
 from uavexp.trajectory import Trajectory
-from uavexp.types import Limits, PlanRequest, PlanStatus
+from uavexp.types import PlanRequest, PlanStatus
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,32 +27,6 @@ class SmoothResult:
             raise ValueError(f"a result with status {self.status} must have a trajectory iff ok")
 
 
-class Smoother(Protocol):
-    """Turns any planner's path into what can be flown; has no state."""
-
-    def smooth(
-        self,
-        request: PlanRequest,
-        path_m: Float,
-        times_s: Float | None,
-        limits: Limits,
-        min_clearance_m: float,
-        known_only: bool,
-    ) -> SmoothResult:
-        """Return a trajectory that begins as requested and ends at the path's end.
-
-        Args:
-            request: what was asked of the planner.
-            path_m: (P, 3) from the request's position to its goal, free at `min_clearance_m`.
-            times_s: (P,) seconds from the start at which a dynamic planner passes these points;
-                None: the smoother times the path.
-            limits: of the vehicle.
-            min_clearance_m: least mapped distance of the body centre.
-            known_only: whether unknown space is closed.
-        """
-        ...
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ShapedPath:
     """Answer of a shaper: what it cannot do is a status, not an exception."""
@@ -65,6 +39,20 @@ class ShapedPath:
     def __post_init__(self) -> None:
         if (self.trajectory is not None) != (self.status is PlanStatus.OK):
             raise ValueError(f"a result with status {self.status} must have a trajectory iff ok")
+
+
+def shaped_by(
+    smooth: Callable[..., SmoothResult], request: PlanRequest, found: FoundPath, constraints: Constraints
+) -> ShapedPath:
+    """A smoother's answer."""
+    known = (constraints.limits, constraints.min_clearance_m, constraints.known_only)
+    smoothed = smooth(request, found.path_m, found.times_s, *known)
+    return ShapedPath(
+        status=smoothed.status,
+        reason=smoothed.reason,
+        trajectory=smoothed.trajectory,
+        iterations=smoothed.iterations,
+    )
 
 
 class Shaper(Protocol):

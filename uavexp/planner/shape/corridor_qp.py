@@ -21,18 +21,21 @@ All budgets are iterations; the answer depends on the request and nothing else.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import StrEnum
-from typing import NamedTuple
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 
 from uavexp.arrays import Float
 from uavexp.braking import braking_trajectory, stopping_distance_m
-from uavexp.errors import require, require_non_negative, require_option, require_positive
+from uavexp.parameters import NonNegative, Positive, between, option
 from uavexp.planner.clearance import shortfall
+from uavexp.planner.constraints import Constraints
+from uavexp.planner.find.base import FoundPath
 from uavexp.planner.find.free_space import straight_is_free
-from uavexp.planner.shape.base import SmoothResult
+from uavexp.planner.movers.moving import MovingObstacles
+from uavexp.planner.shape.base import ShapedPath, SmoothResult, shaped_by
 from uavexp.planner.shape.corridor import make_corridor
 from uavexp.planner.shape.course import TANGENT_M, Task, at_shares, course, space_of
 from uavexp.planner.shape.quadratic import NO_CUTS, Problem, solve
@@ -78,23 +81,26 @@ class Rung(NamedTuple):
 LADDER = (Rung(1.0, True, True), Rung(1.6, True, False), Rung(2.0, False, False))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BsplineSmoother:
+@option
+class CorridorQp:
     """Smoother `bspline_qp`; see the module."""
 
-    derivative: Derivative = Derivative.ACCELERATION
-    span_s: float = 0.3
-    duration_margin: float = 1.05
-    end_speed_mps: float = 1.5
+    derivative: Derivative = Derivative.ACCELERATION  # whose square is minimised: acceleration (cubic;
+    # paper 4) | jerk (degree 4) | snap (degree 5)
+    span_s: Positive = 0.3  # s, duration of a polynomial piece, unless that makes more than 60 [ours]
+    duration_margin: Annotated[float, between(1, 10)] = 1.05  # 1, factor on the time-optimal traversal of
+    # the path [ours]
+    end_speed_mps: NonNegative = 1.5  # m/s, speed at a goal that is not the target, if there is room to
+    # stop behind it [ours]
 
-    def __post_init__(self) -> None:
-        require_option("derivative", self.derivative, Derivative)
-        require_positive(span_s=self.span_s)
-        require_non_negative(end_speed_mps=self.end_speed_mps)
-        require(
-            1.0 <= self.duration_margin <= 10.0,
-            f"duration_margin must be in [1, 10], got {self.duration_margin}",
-        )
+    sees_movers: ClassVar[bool] = False
+
+    def shape(
+        self, request: PlanRequest, found: FoundPath, constraints: Constraints, movers: MovingObstacles
+    ) -> ShapedPath:
+        """Return a trajectory or the reason why there is none (`Shaper.shape`)."""
+        del movers
+        return shaped_by(self.smooth, request, found, constraints)
 
     def smooth(
         self,

@@ -15,15 +15,15 @@ places, each at its own instant (`moving`): at the samples' instants, and hard o
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import partial
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from uavexp.arrays import Float
 from uavexp.braking import jerk_mps3
 from uavexp.field import DistanceField
+from uavexp.parameters import Count, NonNegative, Positive, between, option
 from uavexp.planner.clearance import shortfall
 from uavexp.planner.constraints import Constraints
 from uavexp.planner.find.base import FoundPath
@@ -61,19 +61,26 @@ _UNKNOWN_TETHER = 400.0  # of samples within a voxel of unknown space, when that
 _AROUND = np.vstack([np.zeros(3), np.eye(3), -np.eye(3)])
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@option
 class Scp:
     """Least acceleration by sequential convex programming; see the module."""
 
     sees_movers: ClassVar[bool] = True
 
-    obstacle_weight: float = 60.0
-    end_speed_mps: float = 1.5
-    duration_margin: float = 1.1
-    control_spacing_m: float = 0.6
-    first_iterations: int = 3
-    final_iterations: int = 4
-    tolerance: float = 0.01
+    obstacle_weight: Positive = 60.0  # m²/s⁴, lambda: what a surface's touch is worth as a squared
+    # acceleration [ours]
+    end_speed_mps: NonNegative = 1.5  # m/s, speed at a goal that is not the target, if there is room to
+    # stop behind it [ours]
+    duration_margin: Annotated[float, between(1, 10)] = 1.1  # 1, factor on the time-optimal traversal of
+    # the curve [ours]
+    control_spacing_m: Positive = 0.6  # m, path length per control point [ours]
+    first_iterations: Count = 3  # QPs before the curve is timed anew [ours]
+    final_iterations: Count = 4  # QPs at most after that, and after each stretching of the duration [ours]
+    tolerance: Positive = 0.01  # 1, a smaller relative gain in cost ends the iteration [ours]
+
+    def __post_init__(self) -> None:
+        for count in range(10, MOST_POINTS + 1, 2):
+            make_cubic(count)  # cached: no request pays for it
 
     def shape(
         self, request: PlanRequest, found: FoundPath, constraints: Constraints, movers: MovingObstacles
@@ -113,12 +120,6 @@ def _end_velocity(route: Route, field: DistanceField, constraints: Constraints, 
     )
     velocity: Float = min(end_speed, math.sqrt(reachable), stoppable) * along
     return velocity
-
-
-def load() -> None:
-    """Take the matrices of every size that is used: no request pays for it."""
-    for count in range(10, MOST_POINTS + 1, 2):
-        make_cubic(count)
 
 
 class _Cubic:

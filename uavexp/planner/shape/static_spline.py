@@ -12,14 +12,14 @@ true cost follows. The limits [ours] are half spaces, renewed each step. The res
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
 from uavexp.arrays import Float
 from uavexp.braking import stopping_distance_m
+from uavexp.parameters import Count, NonNegative, Positive, between, option
 from uavexp.planner.clearance import shortfall
 from uavexp.planner.constraints import Constraints
 from uavexp.planner.find.base import FoundPath
@@ -48,22 +48,28 @@ _TOLERANCE = 0.01  # a smaller relative gain in cost ends the iteration
 _AHEAD_M = 0.05  # spacing at which the way beyond a moving end is checked
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@option
 class StaticSpline:
     """Paper 3's static planner; see the module."""
 
     sees_movers: ClassVar[bool] = False
 
-    order: int = 4  # k; degree k - 1
-    stop_at_ends: bool = False  # repeated control points: it begins and ends at rest
-    control_weight: float = 1.0  # α_control, 1
-    smooth_weight: float = 0.01  # α_smooth, s²
-    static_weight: float = 60.0  # α_static, m²/s⁴
-    end_speed_mps: float = 1.5  # at a goal that is not the target
-    duration_margin: float = 1.1
-    control_spacing_m: float = 0.6
-    first_iterations: int = 3
-    final_iterations: int = 4
+    order: Annotated[int, between(4, 8)] = 4  # k of the spline, degree k - 1; the first and last k - 1
+    # control points are fixed (paper 3); 4 is the least with continuous acceleration
+    stop_at_ends: bool = False  # true: repeated control points, a stop at every goal (paper 3); false:
+    # continuous with the present motion [ours]
+    control_weight: Positive = 1.0  # 1, alpha_control of the integral of squared acceleration; the paper
+    # gives no number
+    smooth_weight: NonNegative = 0.01  # s², alpha_smooth of the integral of squared jerk [ours]
+    static_weight: NonNegative = 60.0  # m²/s⁴, alpha_static: what a surface's touch is worth as a squared
+    # acceleration [ours]
+    end_speed_mps: NonNegative = 1.5  # m/s, speed at a goal that is not the target, if there is room to
+    # stop behind it [ours]
+    duration_margin: Annotated[float, between(1, 10)] = 1.1  # 1, factor on the time-optimal traversal of
+    # the curve [ours]
+    control_spacing_m: Positive = 0.6  # m, path length per control point [ours]
+    first_iterations: Count = 3  # QPs of the spline before the curve is timed anew [ours]
+    final_iterations: Count = 4  # QPs at most after that, and after each stretching of the duration [ours]
 
     def shape(
         self, request: PlanRequest, found: FoundPath, constraints: Constraints, movers: MovingObstacles

@@ -12,15 +12,19 @@ path where that is free, else back the way it came.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from uavexp.arrays import Float
 from uavexp.braking import braking_trajectory, jerk_mps3
+from uavexp.parameters import option
 from uavexp.planner.clearance import shortfall
+from uavexp.planner.constraints import Constraints
+from uavexp.planner.find.base import FoundPath
 from uavexp.planner.find.free_space import free_space
-from uavexp.planner.shape.base import SmoothResult
+from uavexp.planner.movers.moving import MovingObstacles
+from uavexp.planner.shape.base import ShapedPath, SmoothResult, shaped_by
 from uavexp.planner.shape.shortcut import shortcut
 from uavexp.trajectory import Trajectory, evaluate, join, sample_times
 from uavexp.types import Limits, PlanRequest, PlanStatus
@@ -31,9 +35,20 @@ _SHORTEST_S = 0.1  # of a trajectory to where the vehicle already is
 _POWERS = np.array([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@option
 class TimeLaw:
     """Smoother `none`; see the module. Times that came with a path are not used."""
+
+    sees_movers: ClassVar[bool] = False
+
+    def shape(
+        self, request: PlanRequest, found: FoundPath, constraints: Constraints, movers: MovingObstacles
+    ) -> ShapedPath:
+        """Return a trajectory or the reason why there is none (`Shaper.shape`)."""
+        del movers
+        if found.motion is not None:
+            return ShapedPath(status=PlanStatus.OK, trajectory=found.motion)
+        return shaped_by(self.smooth, request, found, constraints)
 
     def smooth(
         self,

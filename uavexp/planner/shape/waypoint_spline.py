@@ -10,13 +10,17 @@ law), and it is never a default.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from uavexp.arrays import Float
-from uavexp.planner.shape.base import SmoothResult
+from uavexp.parameters import option
+from uavexp.planner.constraints import Constraints
+from uavexp.planner.find.base import FoundPath
+from uavexp.planner.movers.moving import MovingObstacles
+from uavexp.planner.shape.base import ShapedPath, SmoothResult, shaped_by
 from uavexp.trajectory import Trajectory
 from uavexp.types import Limits, PlanRequest, PlanStatus
 
@@ -24,9 +28,18 @@ _SHORTEST_M = 1e-3  # corners nearer than this are one
 _SHORTEST_S = 0.1  # of a trajectory to where the vehicle already is
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@option
 class WaypointSpline:
     """Smoother `waypoint_spline`; see the module. Times that came with a path are not used."""
+
+    sees_movers: ClassVar[bool] = False
+
+    def shape(
+        self, request: PlanRequest, found: FoundPath, constraints: Constraints, movers: MovingObstacles
+    ) -> ShapedPath:
+        """Return a trajectory or the reason why there is none (`Shaper.shape`)."""
+        del movers
+        return shaped_by(self.smooth, request, found, constraints)
 
     def smooth(
         self,

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.sparse import coo_matrix
@@ -10,24 +13,32 @@ from scipy.sparse.csgraph import dijkstra
 from tests.folders import SHARED
 from uavexp.arrays import Float
 from uavexp.check.fields import bounds, box, empty, field_from, warehouse
+from uavexp.check.hall import LIMITS
+from uavexp.check.requests import ask
 from uavexp.field import DistanceField
-from uavexp.planner.find.grid import PathSearch
+from uavexp.planner.constraints import Constraints
+from uavexp.planner.find.base import FoundPath
+from uavexp.planner.find.grid import Grid
 from uavexp.types import PlanStatus
 
 DATA = SHARED / "voxel_path"
 MIN_M, SAFE_M, WEIGHT, VOXEL_M = 0.2, 0.6, 2.0, 0.1
 
 
-def search(**changes: float | bool) -> PathSearch:
-    settings = {
-        "min_clearance_m": MIN_M,
-        "safe_clearance_m": SAFE_M,
-        "clearance_weight": WEIGHT,
-        "z_band_m": 10.0,
-        "known_only": False,
-        "max_expansions": 10_000_000,
-    }
-    return PathSearch(**(settings | changes))  # type: ignore[arg-type]
+class Search:
+    """A grid search between two points within bounds."""
+
+    def __init__(self, **changes: Any) -> None:
+        self.grid = Grid(
+            clearance_weight=changes.pop("clearance_weight", WEIGHT),
+            max_expansions=changes.pop("max_expansions", 10_000_000),
+        )
+        kept = {"min_clearance_m": MIN_M, "safe_clearance_m": SAFE_M, "z_band_m": 10.0, "known_only": False}
+        self.constraints = Constraints(limits=LIMITS, **(kept | changes))
+
+    def find(self, field: DistanceField, start_m: Float, goal_m: Float, bounds_m: Float) -> FoundPath:
+        asked = replace(ask(field, start_m, goal_m), flight_bounds_m=bounds_m)
+        return self.grid.find(asked, self.constraints, np.random.default_rng(0))
 
 
 def dijkstra_cost(field: DistanceField, start: tuple[int, ...], goal: tuple[int, ...]) -> float:
@@ -69,7 +80,7 @@ def test_cost_is_the_least_by_dijkstra(seed: int) -> None:
         box(grid, tuple(corner), tuple(corner + rng.uniform(0.1, [0.7, 0.7, 1.6])))
     field = field_from(grid)
     open_ = np.argwhere(field.distance >= 0.3)
-    finder = search()
+    finder = Search()
     for _ in range(5):
         start, goal = (tuple(int(v) for v in open_[rng.integers(len(open_))]) for _ in range(2))
         ends = (np.array([start, goal]) + 0.5) * VOXEL_M
@@ -79,7 +90,7 @@ def test_cost_is_the_least_by_dijkstra(seed: int) -> None:
             assert found.status is PlanStatus.NO_PATH
         else:
             assert found.status is PlanStatus.OK
-            assert found.cost_m == pytest.approx(expected, rel=3e-6)
+            assert found.cost == pytest.approx(expected, rel=3e-6)
             length = np.linalg.norm(np.diff(found.path_m, axis=0), axis=1)
             assert length.max() <= np.sqrt(3.0) * VOXEL_M + 1e-9  # neighbours only
             assert field.distance_m(found.path_m[1:-1]).min(initial=9.0) >= MIN_M
@@ -94,7 +105,7 @@ def test_published_optima(name: str, longest: float) -> None:
     problems = np.loadtxt(DATA / f"{name}.3dmap.3dscen", skiprows=2)
     problems = problems[problems[:, 6] < longest]
     # a limit below half a voxel's diagonal: no corner is cut, as in the benchmark
-    finder = search(min_clearance_m=0.5, safe_clearance_m=0.5, clearance_weight=0.0, z_band_m=1e3)
+    finder = Search(min_clearance_m=0.5, safe_clearance_m=0.5, clearance_weight=0.0, z_band_m=1e3)
     for problem in problems[:: len(problems) // 40]:
         ends, cost = problem[:6].reshape(2, 3), problem[6]
         # no cell of a path of this cost is further out than half of it
@@ -111,7 +122,7 @@ def test_published_optima(name: str, longest: float) -> None:
         )
         found = finder.find(field, ends[0] + 0.5, ends[1] + 0.5, np.stack([low, high]).astype(np.float64))
         assert found.status is PlanStatus.OK
-        assert found.cost_m == pytest.approx(cost, rel=3e-6)
+        assert found.cost == pytest.approx(cost, rel=3e-6)
 
 
 def room() -> tuple[DistanceField, Float]:
@@ -126,12 +137,12 @@ def test_statuses() -> None:
     field, limits = room()
     free, wall = np.array([1.0, 1.0, 1.0]), np.array([2.0, 1.0, 1.0])
     beyond, outside = np.array([3.0, 1.0, 1.0]), np.array([3.0, 1.0, 2.5])
-    assert search().find(field, wall, free, limits).status is PlanStatus.START_BLOCKED
-    assert search().find(field, free, wall, limits).status is PlanStatus.GOAL_BLOCKED
-    assert search().find(field, free, outside, limits).status is PlanStatus.GOAL_BLOCKED
-    assert search().find(field, free, beyond, limits).status is PlanStatus.OK
-    assert search(min_clearance_m=0.55).find(field, free, beyond, limits).status is PlanStatus.NO_PATH
-    few = search(max_expansions=5).find(field, free, beyond, limits)
+    assert Search().find(field, wall, free, limits).status is PlanStatus.START_BLOCKED
+    assert Search().find(field, free, wall, limits).status is PlanStatus.GOAL_BLOCKED
+    assert Search().find(field, free, outside, limits).status is PlanStatus.GOAL_BLOCKED
+    assert Search().find(field, free, beyond, limits).status is PlanStatus.OK
+    assert Search(min_clearance_m=0.55).find(field, free, beyond, limits).status is PlanStatus.NO_PATH
+    few = Search(max_expansions=5).find(field, free, beyond, limits)
     assert few.status is PlanStatus.NO_PATH
     assert "5 expansions" in few.reason
 
@@ -140,7 +151,7 @@ def test_flight_bounds_close_the_door() -> None:
     field, limits = room()
     limits = limits.copy()
     limits[1, 1] = 2.6
-    found = search().find(field, np.array([1.0, 1.0, 1.0]), np.array([3.0, 1.0, 1.0]), limits)
+    found = Search().find(field, np.array([1.0, 1.0, 1.0]), np.array([3.0, 1.0, 1.0]), limits)
     assert found.status is PlanStatus.NO_PATH
 
 
@@ -149,10 +160,10 @@ def test_height_band_forbids_flying_over() -> None:
     box(grid, (1.9, 0.0, 0.0), (2.1, 2.0, 1.2))
     field, limits = field_from(grid), bounds(grid)
     ends = np.array([1.0, 1.0, 0.6]), np.array([3.0, 1.0, 0.6])
-    over = search(z_band_m=1.2).find(field, *ends, limits)
+    over = Search(z_band_m=1.2).find(field, *ends, limits)
     assert over.status is PlanStatus.OK
     assert over.path_m[:, 2].max() > 1.4
-    assert search(z_band_m=0.3).find(field, *ends, limits).status is PlanStatus.NO_PATH
+    assert Search(z_band_m=0.3).find(field, *ends, limits).status is PlanStatus.NO_PATH
 
 
 def test_prefers_the_wide_door() -> None:
@@ -162,8 +173,8 @@ def test_prefers_the_wide_door() -> None:
     grid[19:21, 22:38] = False  # 1.6 m wide
     field = field_from(grid)
     ends = np.array([1.0, 1.6, 0.5]), np.array([3.0, 1.6, 0.5])
-    careless = search(clearance_weight=0.0).find(field, *ends, bounds(grid)).path_m
-    careful = search(clearance_weight=5.0).find(field, *ends, bounds(grid)).path_m
+    careless = Search(clearance_weight=0.0).find(field, *ends, bounds(grid)).path_m
+    careful = Search(clearance_weight=5.0).find(field, *ends, bounds(grid)).path_m
     assert careless[np.argmin(abs(careless[:, 0] - 2.0)), 1] < 1.2
     assert careful[np.argmin(abs(careful[:, 0] - 2.0)), 1] > 2.2
 
@@ -172,7 +183,7 @@ def test_prefers_the_wide_door() -> None:
 def test_leaves_a_wall_that_it_is_too_close_to(gap_m: float) -> None:
     field, limits = room()
     start = np.array([1.9 - gap_m, 1.0, 1.0])
-    found = search().find(field, start, np.array([0.5, 3.0, 1.0]), limits)
+    found = Search().find(field, start, np.array([0.5, 3.0, 1.0]), limits)
     assert found.status is PlanStatus.OK
     clearance = field.distance_m(found.path_m)
     away = int(np.argmax(clearance >= MIN_M))
@@ -187,10 +198,10 @@ def test_unknown_is_blocked_only_when_asked() -> None:
     unknown[20:24] = True
     field, limits = field_from(grid, unknown=unknown), bounds(grid)
     ends = np.array([1.0, 1.0, 0.5]), np.array([3.0, 1.0, 0.5])
-    assert search().find(field, *ends, limits).status is PlanStatus.OK
-    assert search(known_only=True).find(field, *ends, limits).status is PlanStatus.NO_PATH
+    assert Search().find(field, *ends, limits).status is PlanStatus.OK
+    assert Search(known_only=True).find(field, *ends, limits).status is PlanStatus.NO_PATH
     inside = np.array([2.2, 1.0, 0.5])
-    assert search(known_only=True).find(field, ends[0], inside, limits).status is PlanStatus.GOAL_BLOCKED
+    assert Search(known_only=True).find(field, ends[0], inside, limits).status is PlanStatus.GOAL_BLOCKED
 
 
 def test_buffers_carry_nothing_over() -> None:
@@ -198,9 +209,9 @@ def test_buffers_carry_nothing_over() -> None:
     field, limits = field_from(grid), bounds(grid)
     rng = np.random.default_rng(5)
     open_ = np.argwhere(field.distance[:, :, 13] > 0.4)
-    used = search()
+    used = Search()
     for _ in range(6):
         ends = [np.append((open_[rng.integers(len(open_))] + 0.5) * VOXEL_M, 1.35) for _ in range(2)]
-        again, fresh = used.find(field, *ends, limits), search().find(field, *ends, limits)
+        again, fresh = used.find(field, *ends, limits), Search().find(field, *ends, limits)
         assert again.path_m.tobytes() == fresh.path_m.tobytes()
         assert again.expansions == fresh.expansions

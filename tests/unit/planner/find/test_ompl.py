@@ -15,10 +15,11 @@ from uavexp.check.fields import bounds, box, empty, field_from
 from uavexp.errors import ConfigError
 from uavexp.geometry import polyline_length_m
 from uavexp.planner.bitstar import Bitstar
-from uavexp.planner.find import ompl_process
+from uavexp.planner.find import ompl_server
 from uavexp.planner.find.free_space import FreeSpace, free_space, straight_is_free
-from uavexp.planner.find.ompl_process import Query, search_with_ompl
-from uavexp.planner.rrtstar import Rrtstar
+from uavexp.planner.find.ompl_bitstar import OmplBitstar
+from uavexp.planner.find.ompl_rrtstar import OmplRrtstar
+from uavexp.planner.find.ompl_server import Query, search_with_ompl
 from uavexp.types import Goal, Limits, PlanRequest, PlanStatus
 
 pytest.importorskip("ompl")
@@ -70,13 +71,14 @@ def test_paths_are_free_and_cost_never_rises(planner: str) -> None:
     assert shortest < answer.history[-1, 1] < 1.2 * shortest
 
 
-@pytest.mark.parametrize("made", [Bitstar(), Rrtstar()])
-def test_hopeless_requests_have_a_status(made: Bitstar | Rrtstar) -> None:
+@pytest.mark.parametrize("finder", [OmplBitstar, OmplRrtstar])
+def test_hopeless_requests_have_a_status(finder: type[OmplBitstar | OmplRrtstar]) -> None:
+    made = Bitstar(find=finder())
     made.reset(LIMITS, np.random.default_rng(0))
     wall = np.array([3.1, 1.0, 1.2])
     assert made.plan(request(start=wall)).status is PlanStatus.START_BLOCKED
     assert made.plan(request(goal=wall)).status is PlanStatus.GOAL_BLOCKED
-    none = type(made)(max_iterations=0)
+    none = Bitstar(find=finder(max_iterations=1))
     none.reset(LIMITS, np.random.default_rng(0))
     result = none.plan(request())
     assert result.status is PlanStatus.NO_PATH
@@ -84,15 +86,17 @@ def test_hopeless_requests_have_a_status(made: Bitstar | Rrtstar) -> None:
 
 
 def test_without_ompl_the_error_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ompl_process.importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(ConfigError, match=r"planner=bitstar needs OMPL: pip install 'uavexp\[peers\]'"):
-        Bitstar().reset(LIMITS, np.random.default_rng(0))
+    monkeypatch.setattr(ompl_server.importlib.util, "find_spec", lambda name: None)
+    planner = Bitstar()
+    planner.reset(LIMITS, np.random.default_rng(0))
+    with pytest.raises(ConfigError, match=r"OMPL is not installed: pip install 'uavexp\[peers\]'"):
+        planner.plan(request())
 
 
 @pytest.mark.skipif(not Path("/proc").is_dir(), reason="reads /proc")
 def test_the_server_ends_with_its_parent_also_when_that_is_killed() -> None:
     code = (
-        "from uavexp.planner.find.ompl_process import _server; import time\n"
+        "from uavexp.planner.find.ompl_server import _server; import time\n"
         "print(_server().pid, flush=True); time.sleep(60)"
     )
     parent = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)

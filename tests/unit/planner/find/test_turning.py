@@ -6,10 +6,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from tests.contract.test_planner_contract import LIMITS, ask
 
 from tests.voxel_paths import is_path, random_grid, turning
 from uavexp.check.fields import box, empty, field_from
+from uavexp.check.hall import LIMITS
+from uavexp.check.requests import ask
 from uavexp.errors import ConfigError
 from uavexp.geometry import polyline_length_m
 from uavexp.metrics.voxel_path import (
@@ -18,9 +19,10 @@ from uavexp.metrics.voxel_path import (
     height_reversals,
     mean_heading_change_rad,
 )
-from uavexp.planner.find.voxel.directed import COUNT_MADE, COUNT_OPEN, RULE_AND, RULE_NONE, RULE_OR
-from uavexp.planner.find.voxel.grid import Turning, VoxelGrid
-from uavexp.planner.find.voxel.smoothing import in_sight, key_waypoints, smoothed, without_reversals
+from uavexp.planner.find.turning import Turning
+from uavexp.planner.find.voxels.directed import COUNT_MADE, COUNT_OPEN, RULE_AND, RULE_NONE, RULE_OR
+from uavexp.planner.find.voxels.voxel_grid import VoxelGrid, Wish
+from uavexp.planner.find.voxels.waypoints import in_sight, key_waypoints, smoothed, without_reversals
 from uavexp.planner.improved_astar import ImprovedAstar
 from uavexp.planner.shape.timing import resample
 from uavexp.trajectory import evaluate
@@ -33,7 +35,7 @@ RULES = {"none": RULE_NONE, "or": RULE_OR, "and": RULE_AND}
 @pytest.mark.parametrize("made_counts", [True, False])
 def test_exact_form_has_the_least_sum_by_dijkstra(rule: str, made_counts: bool) -> None:
     rng = np.random.default_rng(7)
-    wish = Turning(turn_weight=0.8, rule=RULES[rule], reading=COUNT_MADE if made_counts else COUNT_OPEN)
+    wish = Wish(turn_weight=0.8, rule=RULES[rule], reading=COUNT_MADE if made_counts else COUNT_OPEN)
     solved = 0
     for density in (0.05, 0.2, 0.35, 0.35, 0.5):
         free, start, goal = random_grid(rng, (5, 5, 4), density)
@@ -50,7 +52,7 @@ def test_paper_form_finds_paths_that_are_hardly_longer() -> None:
     for _ in range(60):
         free, start, goal = random_grid(rng, (8, 8, 6), 0.25)
         grid, ends = VoxelGrid(free), (np.array(start), np.array(goal))
-        plain, paper = grid.shortest(*ends), grid.turning(*ends, Turning(exact=False, rule=RULE_NONE))
+        plain, paper = grid.shortest(*ends), grid.turning(*ends, Wish(exact=False, rule=RULE_NONE))
         assert plain.found == paper.found
         if plain.found:
             assert is_path(free, paper.cells)
@@ -64,25 +66,25 @@ def test_without_weight_the_exact_form_is_plain() -> None:
     for _ in range(30):
         free, start, goal = random_grid(rng, (7, 6, 6), 0.3)
         grid, ends = VoxelGrid(free), (np.array(start), np.array(goal))
-        wish = Turning(turn_weight=0.0, rule=RULE_NONE)
+        wish = Wish(turn_weight=0.0, rule=RULE_NONE)
         assert grid.turning(*ends, wish).cost == pytest.approx(grid.shortest(*ends).cost, abs=1e-9)
 
 
 def test_near_the_goals_height_the_rule_asks_for_five_level_steps() -> None:
     free = np.ones((12, 1, 3), dtype=bool)
     ends = np.array([0, 0, 0]), np.array([11, 0, 1])
-    cells = VoxelGrid(free).turning(*ends, Turning()).cells
+    cells = VoxelGrid(free).turning(*ends, Wish()).cells
     climb = int(np.flatnonzero(np.diff(cells[:, 2]))[0])
     assert climb >= 5
-    assert VoxelGrid(free).turning(*ends, Turning(rule=RULE_NONE)).cost < 11.0 + np.sqrt(2.0)
+    assert VoxelGrid(free).turning(*ends, Wish(rule=RULE_NONE)).cost < 11.0 + np.sqrt(2.0)
 
 
 def test_a_rule_that_forbids_every_climb_falls_back_and_says_so() -> None:
     grid = empty((3.0, 3.0, 3.0))
     field = field_from(grid)
-    request = ask(field, grid, np.array([0.8, 1.5, 0.8]), np.array([2.2, 1.5, 2.2]))
+    request = ask(field, np.array([0.8, 1.5, 0.8]), np.array([2.2, 1.5, 2.2]))
     for rule, remark in (("or", ""), ("and", "plain A*: the vertical rule leaves no path")):
-        planner = ImprovedAstar(vertical_rule=rule)  # type: ignore[arg-type]
+        planner = ImprovedAstar(find=Turning(vertical_rule=rule))  # type: ignore[arg-type]
         planner.reset(LIMITS, np.random.default_rng(0))
         result = planner.plan(request)
         assert result.status is PlanStatus.OK
@@ -94,8 +96,8 @@ def test_an_exhausted_budget_falls_back_and_says_so() -> None:
     free[12:15, :25] = False
     grid, ends = VoxelGrid(free), (np.array([5, 5, 4]), np.array([25, 5, 4]))
     budget = grid.shortest(*ends).expansions
-    planner = ImprovedAstar(max_expansions=budget, form="exact")
-    answer, remark = planner.search(grid, *ends, planner.wish(0.1))
+    finder = Turning(max_expansions=budget, form="exact")
+    answer, remark = finder.search(grid, *ends, finder.wish(0.1))
     assert answer.found
     assert remark == f"plain A*: not found in {budget} expansions"
 
@@ -105,14 +107,14 @@ def test_the_first_step_keeps_the_direction_flown() -> None:
     free[3:6, 3:6] = False
     grid, start, goal = VoxelGrid(free), np.array([0, 4, 1]), np.array([8, 4, 1])
     for side in (-1.0, 1.0):
-        wish = Turning(first_weight=2.0, first_direction=(0.0, side, 0.0), rule=RULE_NONE)
+        wish = Wish(first_weight=2.0, first_direction=(0.0, side, 0.0), rule=RULE_NONE)
         cells = grid.turning(start, goal, wish).cells
         assert np.sign(cells[len(cells) // 2, 1] - 4) == side
 
 
 def test_the_weight_in_metres_is_dearer_in_small_voxels() -> None:
-    assert ImprovedAstar(weight_unit="metres").wish(0.03).turn_weight == pytest.approx(0.5 / 0.03)  # type: ignore[arg-type]
-    assert ImprovedAstar().wish(0.03).turn_weight == 0.5
+    assert Turning(weight_unit="metres").wish(0.03).turn_weight == pytest.approx(0.5 / 0.03)  # type: ignore[arg-type]
+    assert Turning().wish(0.03).turn_weight == 0.5
 
 
 def test_sight_touches_every_cell_of_the_segment() -> None:
@@ -189,7 +191,7 @@ def test_metrics_of_a_path_by_hand() -> None:
 def test_what_is_flown_follows_the_smoothed_path() -> None:
     grid = empty((8.0, 5.0, 2.0))
     box(grid, (3.0, 0.0, 0.0), (3.4, 3.2, 2.0))
-    request = ask(field_from(grid), grid, np.array([1.0, 1.0, 1.0]), np.array([7.0, 1.0, 1.0]))
+    request = ask(field_from(grid), np.array([1.0, 1.0, 1.0]), np.array([7.0, 1.0, 1.0]))
     planner = ImprovedAstar()
     planner.reset(LIMITS, np.random.default_rng(0))
     result = planner.plan(request)
@@ -210,4 +212,4 @@ def test_impossible_parameters_are_refused() -> None:
     }
     for name, value in wrong.items():
         with pytest.raises(ConfigError, match=name):
-            ImprovedAstar(**{name: value})  # type: ignore[arg-type]
+            Turning(**{name: value})  # type: ignore[arg-type]

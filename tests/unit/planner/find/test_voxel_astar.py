@@ -10,17 +10,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.contract.test_planner_contract import LIMITS, ask
 
 from tests.folders import SHARED
 from tests.voxel_paths import is_path, random_grid, shortest
 from uavexp.check.fields import box, empty, field_from
+from uavexp.check.hall import LIMITS
+from uavexp.check.requests import ask
 from uavexp.errors import ConfigError
 from uavexp.planner.astar import Astar
-from uavexp.planner.find.voxel.benchmark import main, read_map, read_scenarios
-from uavexp.planner.find.voxel.canonical import BUDGET
-from uavexp.planner.find.voxel.grid import VoxelGrid
-from uavexp.planner.find.voxel.moves import FULL, LENGTHS, STAY, STEPS, canonical_moves, open_moves
+from uavexp.planner.find.voxels.canonical import BUDGET
+from uavexp.planner.find.voxels.moves import FULL, LENGTHS, STAY, STEPS, canonical_moves, open_moves
+from uavexp.planner.find.voxels.published import main, read_map, read_scenarios
+from uavexp.planner.find.voxels.voxel_grid import VoxelGrid
 from uavexp.types import PlanStatus, Tracks
 
 DATA = SHARED / "voxel_path"
@@ -180,7 +181,7 @@ def crossing(velocity: tuple[float, float, float], **changes: object) -> tuple[P
     """Path through a hall with a mover in the middle of it."""
     grid = empty((8.0, 5.0, 2.0))
     box(grid, (0.0, 0.0, 0.0), (8.0, 0.3, 2.0))
-    request = ask(field_from(grid), grid, np.array([1.0, 2.5, 1.0]), np.array([7.0, 2.5, 1.0]))
+    request = ask(field_from(grid), np.array([1.0, 2.5, 1.0]), np.array([7.0, 2.5, 1.0]))
     tracks = Tracks(
         time_s=request.time_s,
         identity=np.array([0]),
@@ -207,6 +208,6 @@ def test_movers_block_where_they_are_whatever_they_do() -> None:
 
 
 def test_impossible_parameters_are_refused() -> None:
-    for name, value in (("movers", "later"), ("unknown", "maybe"), ("max_expansions", 0), ("z_band_m", -0.1)):
+    for name, value in (("movers", "later"), ("unknown", "maybe"), ("z_band_m", -0.1)):
         with pytest.raises(ConfigError, match=name):
             Astar(**{name: value})

@@ -182,7 +182,7 @@ TIMELESS = ("bspline_qp", "df_bitstar", "bitstar", "rrtstar")
 def plan_by(option: str, asked: PlanRequest, **parameters: Any) -> PlanResult:
     if option in ("bitstar", "rrtstar"):
         pytest.importorskip("ompl")
-        parameters["max_iterations"] = 500
+        parameters["find"] = build("planner.find", f"ompl_{option}", max_iterations=500)
     planner = build("planner", option, unknown="optimistic", **parameters)
     planner.reset(LIMITS, np.random.default_rng(0))
     return planner.plan(asked)

@@ -11,8 +11,11 @@ from scipy.spatial import cKDTree
 
 from uavexp.arrays import Float
 from uavexp.check.fields import bounds, box, empty, field_from, warehouse
+from uavexp.check.hall import LIMITS
+from uavexp.check.requests import ask
+from uavexp.planner.constraints import Constraints
 from uavexp.planner.find.free_space import free_space, straight_is_free
-from uavexp.planner.find.grid import PathSearch
+from uavexp.planner.find.grid import Grid
 from uavexp.planner.shape.corridor import Corridor, make_corridor
 from uavexp.planner.shape.shortcut import shortcut
 from uavexp.planner.shape.timing import resample
@@ -29,18 +32,18 @@ def paths(seed: int, count: int) -> tuple[np.ndarray, list[Float]]:
     """Occupancy of a hall with shelves, and searched paths through it, 0.8 m between points."""
     grid = warehouse(seed)
     field, rng = field_from(grid), np.random.default_rng(seed)
-    search = PathSearch(
+    search = Grid()
+    kept = Constraints(
+        limits=LIMITS,
         min_clearance_m=CLEARANCE_M,
         safe_clearance_m=0.75,
-        clearance_weight=2.0,
         z_band_m=0.3,
         known_only=False,
-        max_expansions=300_000,
     )
     found: list[Float] = []
     while len(found) < count:
         ends = rng.uniform([1.0, 1.0, 1.1], [25.0, 15.0, 1.6], (2, 3))
-        path = search.find(field, ends[0], ends[1], bounds(grid)).path_m
+        path = search.find(ask(field, *ends), kept, rng).path_m
         if len(path) > 20:
             found.append(resample(path, 0.8))
     return grid, found

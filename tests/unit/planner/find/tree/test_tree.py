@@ -11,19 +11,22 @@ from uavexp.arrays import Float
 from uavexp.check.fields import bounds, box, empty, field_from
 from uavexp.errors import ConfigError
 from uavexp.geometry import polyline_length_m
-from uavexp.planner.df_bitstar import DfBitstar, Edges
-from uavexp.planner.find.free_space import FreeSpace, free_space, straight_is_free
-from uavexp.planner.find.tree.batch import Budget, Found, search
-from uavexp.planner.find.tree.edges import Rule
-from uavexp.planner.find.tree.motion import (
+from uavexp.planner.df_bitstar import DfBitstar
+from uavexp.planner.find.batch_tree.batch import Budget, Found, search
+from uavexp.planner.find.batch_tree.cubic_motion import (
     cubic_coefficients,
     cubic_time,
     keeps_limits,
     least_time,
     scalar_time,
 )
-from uavexp.planner.find.tree.neighbours import neighbours_within, sort_into_cells
-from uavexp.planner.shape.time_law import stop_and_go
+from uavexp.planner.find.batch_tree.edges import Rule
+from uavexp.planner.find.batch_tree.neighbours import neighbours_within, sort_into_cells
+from uavexp.planner.find.free_space import FreeSpace, free_space, straight_is_free
+from uavexp.planner.find.tree import Edges, Tree
+from uavexp.planner.shape.base import Shaper
+from uavexp.planner.shape.corridor_qp import CorridorQp
+from uavexp.planner.shape.time_law import TimeLaw, stop_and_go
 from uavexp.trajectory import evaluate
 from uavexp.types import Goal, Limits, PlanRequest, PlanResult, PlanStatus
 
@@ -53,7 +56,8 @@ def grow(rule: Rule = STRAIGHT, seed: int = 0, **changes: Any) -> Found:
 def plan(start: Float = START, goal: Float = GOAL, limits: Limits = LIMITS, **parameters: Any) -> PlanResult:
     velocity = parameters.pop("velocity", np.zeros(3))
     field, grid = parameters.pop("field", FIELD), parameters.pop("grid", GRID)
-    made = DfBitstar(**parameters)
+    shape, unknown = parameters.pop("shape", CorridorQp()), parameters.pop("unknown", "optimistic")
+    made = DfBitstar(find=Tree(**parameters), shape=shape, unknown=unknown)
     made.reset(limits, np.random.default_rng(3))
     request = PlanRequest(
         time_s=2.0,
@@ -147,7 +151,7 @@ def test_a_batch_leaves_the_shortest_path_of_its_graph() -> None:
 
     found = grow(first_batches=1, batches=0, batch_samples=150, rewire_factor=50.0, iterations=10**7)
     rng, space = np.random.Generator(np.random.PCG64(0)), walled()
-    from uavexp.planner.find.tree.informed import draw, sampled_region
+    from uavexp.planner.find.batch_tree.informed import draw, sampled_region
 
     region, points = sampled_region(space, START, GOAL, np.inf), [START, GOAL]
     while len(points) < 152:
@@ -206,7 +210,7 @@ def test_the_filter_keeps_corners_that_can_be_rounded() -> None:
 
 
 def test_kinodynamic_motion_keeps_limits_and_clearance_without_smoothing() -> None:
-    result = plan(smoothing="none")
+    result = plan(shape=TimeLaw())
     assert result.trajectory is not None
     times = np.arange(result.trajectory.start_s, result.trajectory.end_s, 1e-3)
     position, velocity, acceleration = evaluate(result.trajectory, times)
@@ -225,9 +229,9 @@ def test_time_is_no_less_than_the_bound_and_less_than_stopping_at_corners() -> N
 
 
 @pytest.mark.parametrize("edges", list(Edges))
-@pytest.mark.parametrize("smoothing", ["bspline_qp", "none"])
-def test_every_form_plans(edges: Edges, smoothing: str) -> None:
-    result = plan(edges=edges, smoothing=smoothing)
+@pytest.mark.parametrize("shape", [CorridorQp(), TimeLaw()])
+def test_every_form_plans(edges: Edges, shape: Shaper) -> None:
+    result = plan(edges=edges, shape=shape)
     assert result.status is PlanStatus.OK
     assert result.trajectory is not None
     ends = evaluate(result.trajectory, np.array([result.trajectory.start_s, result.trajectory.end_s]))[0]
@@ -260,8 +264,7 @@ def test_bad_requests_have_a_status_and_a_reason() -> None:
         PlanStatus.NO_PATH: [
             plan(field=field_from(shut), first_batches=10),
             plan(field=field_from(slit), first_batches=10),
-            plan(first_batches=0),
-            plan(max_iterations=0),
+            plan(max_iterations=1),
         ],
         PlanStatus.SOLVER: [plan(start=np.array([np.nan, 1.0, 1.0]))],
     }
@@ -289,15 +292,13 @@ def test_unknown_space_is_closed_when_conservative() -> None:
     ("name", "value"),
     [
         ("edges", "curly"),
-        ("smoothing", "magic"),
-        ("derivative", "crackle"),
         ("batches", -1),
         ("local_share", 1.0),
     ],
 )
 def test_bad_parameters_are_refused(name: str, value: object) -> None:
     with pytest.raises(ConfigError, match=name):
-        DfBitstar(**{name: value})
+        Tree(**{name: value})
 
 
 def test_stop_and_go_stands_at_every_corner_and_never_leaves_the_path() -> None:

@@ -81,15 +81,6 @@ BOXES = _boxes(STEPS)[STAY]  # (27,) cells that a move passes through, ends incl
 SPARED = _spared(STEPS, _boxes(STEPS))
 
 
-@nb.njit(cache=True, inline="always")
-def octile(di: int, dj: int, dk: int) -> float:
-    """Length of the shortest voxel path over (di, dj, dk) in free space, voxels."""
-    a, b, c = abs(di), abs(dj), abs(dk)
-    least, most = min(a, b, c), max(a, b, c)
-    middle = a + b + c - least - most
-    return most + 0.41421356237309515 * middle + 0.31783724519578205 * least
-
-
 @nb.njit(cache=True)
 def open_moves(bits: int) -> int:
     """Which moves a neighbourhood leaves open, as bits (staying is none)."""

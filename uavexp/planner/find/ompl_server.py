@@ -29,8 +29,8 @@ import numpy as np
 from uavexp.arrays import Float
 from uavexp.errors import ConfigError
 from uavexp.field import DistanceField
+from uavexp.planner.find.batch_tree.informed import Region, sampled_region
 from uavexp.planner.find.free_space import FreeSpace, free_space, look, straight_is_free
-from uavexp.planner.find.tree.informed import Region, sampled_region
 
 _LENGTH_BYTES = 8
 
@@ -55,18 +55,15 @@ class Answer(NamedTuple):
     cpu_s: float  # of the search alone
 
 
-def require_ompl(option: str) -> None:
-    """Raise `ConfigError` when OMPL is not installed."""
-    if importlib.util.find_spec("ompl") is None:
-        raise ConfigError(f"planner={option} needs OMPL: pip install 'uavexp[peers]'")
-
-
 def search_with_ompl(query: Query) -> Answer:
     """Run one search and wait for its answer.
 
     Raises:
+        ConfigError: when OMPL is not installed.
         RuntimeError: when the search died; its last words are in the message.
     """
+    if importlib.util.find_spec("ompl") is None:
+        raise ConfigError("OMPL is not installed: pip install 'uavexp[peers]'")
     server = _server()
     if server.poll() is not None or server.stdin is None or server.stdout is None:
         _server.cache_clear()
@@ -82,7 +79,7 @@ def search_with_ompl(query: Query) -> Answer:
 def _server() -> subprocess.Popen[bytes]:
     """The server of this process, started when first needed."""
     server = subprocess.Popen(
-        [sys.executable, "-c", "from uavexp.planner.find.ompl_process import serve; serve()"],
+        [sys.executable, "-c", "from uavexp.planner.find.ompl_server import serve; serve()"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
     )

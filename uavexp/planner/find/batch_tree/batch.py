@@ -21,11 +21,15 @@ import numba as nb
 import numpy as np
 
 from uavexp.arrays import Float, Int
-from uavexp.planner.find.free_space import FreeSpace, cubic_is_free, straight_is_free
-from uavexp.planner.find.tree.edges import Rule, bound, corners_fit, cost, fits
-from uavexp.planner.find.tree.informed import draw, draw_near, sampled_region
-from uavexp.planner.find.tree.neighbours import Neighbours, neighbours_within, radius_of, sort_into_cells
-from uavexp.planner.find.tree.tree import (
+from uavexp.planner.find.batch_tree.edges import Rule, bound, corners_fit, cost, fits
+from uavexp.planner.find.batch_tree.informed import draw, draw_near, sampled_region
+from uavexp.planner.find.batch_tree.neighbours import (
+    Neighbours,
+    neighbours_within,
+    radius_of,
+    sort_into_cells,
+)
+from uavexp.planner.find.batch_tree.tree_rows import (
     GOAL,
     NONE,
     START,
@@ -38,6 +42,7 @@ from uavexp.planner.find.tree.tree import (
     path_to,
     prune,
 )
+from uavexp.planner.find.free_space import FreeSpace, cubic_is_free, straight_is_free
 
 _FAILURES = 1 << 16  # blocked edges that are remembered
 _TRIES = 1000  # draws for one free sample

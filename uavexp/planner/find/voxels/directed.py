@@ -21,9 +21,10 @@ import numba as nb
 import numpy as np
 
 from uavexp.arrays import Bool, Float, Int, Int32, UInt8
-from uavexp.planner.find.voxel.canonical import BUDGET, FOUND, NO_PATH
-from uavexp.planner.find.voxel.jump import neighbourhood
-from uavexp.planner.find.voxel.moves import LENGTHS, STEPS, octile, open_moves
+from uavexp.planner.find.octile import octile
+from uavexp.planner.find.voxels.canonical import BUDGET, FOUND, NO_PATH
+from uavexp.planner.find.voxels.jump import neighbourhood
+from uavexp.planner.find.voxels.moves import LENGTHS, STEPS, open_moves
 
 RULE_NONE, RULE_OR, RULE_AND = 0, 1, 2
 COUNT_MADE, COUNT_OPEN = 0, 1  # readings of N_horizontal

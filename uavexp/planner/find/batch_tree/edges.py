@@ -13,8 +13,8 @@ import numba as nb
 import numpy as np
 
 from uavexp.arrays import Float
-from uavexp.planner.find.tree.motion import cubic_time, least_time
-from uavexp.planner.find.tree.tree import NONE, Tree
+from uavexp.planner.find.batch_tree.cubic_motion import cubic_time, least_time
+from uavexp.planner.find.batch_tree.tree_rows import NONE, Tree
 
 
 class Rule(NamedTuple):

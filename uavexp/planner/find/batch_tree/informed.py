@@ -17,8 +17,8 @@ import numba as nb
 import numpy as np
 
 from uavexp.arrays import Float
+from uavexp.planner.find.batch_tree.cubic_motion import cubic_coefficients
 from uavexp.planner.find.free_space import FreeSpace, look
-from uavexp.planner.find.tree.motion import cubic_coefficients
 
 
 class Region(NamedTuple):

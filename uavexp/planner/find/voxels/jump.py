@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from uavexp.arrays import Bool, Int, UInt8
-from uavexp.planner.find.voxel.moves import canonical_moves
+from uavexp.planner.find.voxels.moves import canonical_moves
 
 UInt64 = npt.NDArray[np.uint64]
 _DE_BRUIJN = 0x03F79D71B4CB0A89  # tells the 64 powers of two apart by their product's upper six bits

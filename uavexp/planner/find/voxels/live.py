@@ -1,4 +1,4 @@
-"""Voxel searches on the live map: a distance field in, a path in metres out."""
+"""Voxel searches on the live map: a request in, a path in metres out."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from uavexp.arrays import Bool, Float, Int
-from uavexp.field import DistanceField
-from uavexp.planner.find.grid import FoundPath
-from uavexp.planner.find.voxel.canonical import BUDGET
-from uavexp.planner.find.voxel.grid import VoxelGrid, VoxelPath
-from uavexp.planner.find.voxel.smoothing import smoothed
-from uavexp.types import PlanStatus
+from uavexp.planner.constraints import Constraints
+from uavexp.planner.find.base import FoundPath
+from uavexp.planner.find.ends import refusal
+from uavexp.planner.find.voxels.canonical import BUDGET
+from uavexp.planner.find.voxels.voxel_grid import VoxelGrid, VoxelPath
+from uavexp.planner.find.voxels.waypoints import smoothed
+from uavexp.types import PlanRequest, PlanStatus
 
 Search = Callable[[VoxelGrid, Int, Int], tuple[VoxelPath, str]]  # cells (3,) to a path and a remark
 
@@ -30,85 +31,49 @@ class LiveGrid(NamedTuple):
     goal: Int  # (3,) cell
 
 
-def find(
-    field: DistanceField,
-    start_m: Float,
-    goal_m: Float,
-    bounds_m: Float,
-    search: Search,
-    *,
-    min_clearance_m: float,
-    z_band_m: float,
-    known_only: bool,
-    spline: bool,
+def find_among_voxels(
+    request: PlanRequest, constraints: Constraints, search: Search, spline: bool
 ) -> FoundPath:
-    """Path between two points (3,) on the map, by a search of its cells.
+    """Path of a request on its map, by a search of its cells.
 
     Args:
-        field: the map.
-        start_m: (3,).
-        goal_m: (3,).
-        bounds_m: (2, 3) that the path stays in.
+        request: what was asked.
+        constraints: what the path keeps.
         search: of the cells; its remark is the reason of the answer.
-        min_clearance_m: of free cells.
-        z_band_m: by which the path may leave the heights between start and goal.
-        known_only: whether unknown cells are blocked.
-        spline: whether the key waypoints are joined by a quadratic spline (`smoothing`).
+        spline: whether the key waypoints are joined by a quadratic spline (`waypoints`).
     """
-    refused = _refusal(field, start_m, goal_m, bounds_m, min_clearance_m)
+    refused = refusal(request, constraints)
     if refused is not None:
         return refused
-    grid = live_grid(
-        field, start_m, goal_m, bounds_m,
-        min_clearance_m=min_clearance_m, z_band_m=z_band_m, known_only=known_only,
-    )  # fmt: skip
+    grid = live_grid(request, constraints)
     answer, remark = search(VoxelGrid(np.ascontiguousarray(grid.free)), grid.start, grid.goal)
     if not answer.found:
         spent = f"not found in {answer.expansions} expansions"
         apart = "start and goal are not joined at the clearance limit"
-        return _failed(PlanStatus.NO_PATH, spent if answer.status == BUDGET else apart, answer.expansions)
+        reason = spent if answer.status == BUDGET else apart
+        return FoundPath(status=PlanStatus.NO_PATH, reason=reason, expansions=answer.expansions)
     points = smoothed(grid.free, answer.centres) if spline else answer.centres
     return FoundPath(
         status=PlanStatus.OK,
-        path_m=in_metres(field, grid, points, start_m, goal_m),
-        cost_m=answer.cost * field.voxel_size_m,
+        path_m=_in_metres(request, grid, points),
+        cost=answer.cost * request.field.voxel_size_m,
         expansions=answer.expansions,
         reason=remark,
     )
 
 
-def _refusal(
-    field: DistanceField, start_m: Float, goal_m: Float, bounds_m: Float, min_clearance_m: float
-) -> FoundPath | None:
-    """Why start or goal make every search vain; None when they do not."""
-    here, there = field.distance_m(np.stack([start_m, goal_m]))
-    if here <= 0.0:
-        return _failed(PlanStatus.START_BLOCKED, f"the start lies {-here:.2f} m inside an obstacle")
-    if there < min_clearance_m or np.any(goal_m < bounds_m[0]) or np.any(goal_m > bounds_m[1]):
-        return _failed(PlanStatus.GOAL_BLOCKED, f"the goal's clearance is {there:.2f} m, or it is outside")
-    return None
-
-
-def live_grid(
-    field: DistanceField,
-    start_m: Float,
-    goal_m: Float,
-    bounds_m: Float,
-    *,
-    min_clearance_m: float,
-    z_band_m: float,
-    known_only: bool,
-) -> LiveGrid:
+def live_grid(request: PlanRequest, constraints: Constraints) -> LiveGrid:
     """Cells of the flight bounds and the height band; this alone says which cells are blocked.
 
     A cell is free when its centre keeps the clearance (and a reserve); around a start that is
     nearer to an obstacle, when it is no nearer than the start. Movers come in as part of the
     field (`moving.stamped`), each where the vehicle would meet it.
     """
+    field, start_m, goal_m = request.field, request.position_m, request.goal.position_m
     size, last = field.voxel_size_m, np.array(field.distance.shape) - 1
-    low, high = bounds_m[0].copy(), bounds_m[1].copy()
-    low[2] = max(low[2], min(start_m[2], goal_m[2]) - z_band_m)
-    high[2] = min(high[2], max(start_m[2], goal_m[2]) + z_band_m)
+    low, high = request.flight_bounds_m.copy()
+    low[2] = max(low[2], min(start_m[2], goal_m[2]) - constraints.z_band_m)
+    high[2] = min(high[2], max(start_m[2], goal_m[2]) + constraints.z_band_m)
     ends = np.floor((np.stack([start_m, goal_m]) - field.origin_m) / size).astype(np.int64)
     ends = np.clip(ends, 0, last)
     first = np.ceil((low - field.origin_m) / size - 0.5 - 1e-9).astype(np.int64)
@@ -117,9 +82,9 @@ def live_grid(
     final = np.clip(np.maximum(final, ends.max(axis=0)), 0, last)
     part = tuple(slice(a, b + 1) for a, b in zip(first, final, strict=True))
     distance = field.distance[part]
-    least = min_clearance_m + _RESERVE_VOXELS * size
+    least = constraints.min_clearance_m + _RESERVE_VOXELS * size
     free = distance >= least
-    if known_only:
+    if constraints.known_only:
         free &= field.state[part] != 0
     start, goal = ends - first
     here = min(float(field.distance_m(start_m[None])[0]), float(distance[tuple(start)]))
@@ -134,14 +99,10 @@ def live_grid(
     return LiveGrid(free, first, start, goal)
 
 
-def in_metres(field: DistanceField, grid: LiveGrid, points: Float, start_m: Float, goal_m: Float) -> Float:
-    """Path (P, 3) of points in cells (`smoothing`: centres at + 0.5), with the exact ends."""
+def _in_metres(request: PlanRequest, grid: LiveGrid, points: Float) -> Float:
+    """Path (P, 3) of points in cells (`waypoints`: centres at + 0.5), with the exact ends."""
+    start_m, goal_m, field = request.position_m, request.goal.position_m, request.field
     path: Float = field.origin_m + (grid.first + points) * field.voxel_size_m
     if len(path) < 2:
         return np.stack([start_m, goal_m])
     return np.concatenate([start_m[None], path[1:-1], goal_m[None]])
-
-
-def _failed(status: PlanStatus, reason: str, expansions: int = 0) -> FoundPath:
-    none = np.zeros((0, 3))
-    return FoundPath(status=status, path_m=none, cost_m=np.inf, expansions=expansions, reason=reason)

@@ -18,7 +18,7 @@ import numpy as np
 
 from uavexp.arrays import Bool, Float
 from uavexp.errors import UavexpError
-from uavexp.planner.find.voxel.grid import VoxelGrid
+from uavexp.planner.find.voxels.voxel_grid import VoxelGrid
 
 _COLUMNS = 8
 _TOLERANCE = 1e-6  # voxels; costs are printed with 8 decimals

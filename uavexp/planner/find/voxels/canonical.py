@@ -18,8 +18,9 @@ import numpy as np
 import numpy.typing as npt
 
 from uavexp.arrays import Int, Int32
-from uavexp.planner.find.voxel.jump import Terrain, is_near, neighbourhood, remembered_moves, run_length
-from uavexp.planner.find.voxel.moves import FULL, LENGTHS, STEPS, octile
+from uavexp.planner.find.octile import octile
+from uavexp.planner.find.voxels.jump import Terrain, is_near, neighbourhood, remembered_moves, run_length
+from uavexp.planner.find.voxels.moves import FULL, LENGTHS, STEPS
 
 Record = npt.NDArray[np.void]
 

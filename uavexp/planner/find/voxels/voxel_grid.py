@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from uavexp.arrays import Bool, Float, Int, Int32
-from uavexp.planner.find.voxel import canonical
-from uavexp.planner.find.voxel.directed import COUNT_MADE, RULE_OR, find_directed
-from uavexp.planner.find.voxel.jump import Terrain, survey
-from uavexp.planner.find.voxel.moves import LENGTHS, STEPS
+from uavexp.planner.find.voxels import canonical
+from uavexp.planner.find.voxels.directed import COUNT_MADE, RULE_OR, find_directed
+from uavexp.planner.find.voxels.jump import Terrain, survey
+from uavexp.planner.find.voxels.moves import LENGTHS, STEPS
 
 NO_LIMIT = 1 << 60
 
@@ -35,7 +35,7 @@ class VoxelPath(NamedTuple):
         return self.status == canonical.FOUND
 
 
-class Turning(NamedTuple):
+class Wish(NamedTuple):
     """What an improved path is asked for; lengths in voxels."""
 
     exact: bool = True  # exact form of the penalty, else the paper's
@@ -74,7 +74,7 @@ class VoxelGrid:
         )
         return VoxelPath(status, cost, cells - 1, expansions)
 
-    def turning(self, start: Int, goal: Int, wish: Turning, max_expansions: int = NO_LIMIT) -> VoxelPath:
+    def turning(self, start: Int, goal: Int, wish: Wish, max_expansions: int = NO_LIMIT) -> VoxelPath:
         """Path with a price on turns and a rule for vertical steps (`directed`); may miss one that exists."""
         if not (self.free[tuple(start)] and self.free[tuple(goal)]):
             return VoxelPath(canonical.NO_PATH, np.inf, np.empty((0, 3), dtype=np.int32), 0)
@@ -85,7 +85,7 @@ class VoxelGrid:
         return VoxelPath(status, cost, cells - 1, expansions)
 
 
-def _first_costs(wish: Turning) -> Float:
+def _first_costs(wish: Wish) -> Float:
     """λ_v (1 - cos) of the angle between each move (27,) and the direction flown."""
     direction = np.array(wish.first_direction)
     if not direction.any():
