@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -32,6 +33,8 @@ from uavexp.vehicle.contact import ContactTracker
 from uavexp.world.base import WorldGenerator
 
 Progress = Callable[[float, str], None]  # simulated time s, a few words
+_LOOK_STEPS = 100  # steps between two looks at whether the vehicle still moves
+_STILL_M = 0.3  # moved less in `stuck_s`: stuck
 
 
 @frozen_option
@@ -108,17 +111,14 @@ def fly_trial(parts: Parts, seed: int, progress: Progress | None = None) -> tupl
 
 def fly(parts: Parts, world: World, seed: int, progress: Progress | None = None) -> TrialLog:
     """Fly one trial in a given world; every rate is a whole number of steps (see `Parts`)."""
-    scene = Scene(world)
-    watch, recorder = Stopwatch(), Recorder()
-    estimate = state = _hover(world)
-    contact = ContactTracker(scene=scene, body_size_m=parts.vehicle.limits.body_size_m)
-    pilot = _begin(parts, world, scene, state, seed, watch)
+    flight = _begin(parts, world, seed)
+    pilot, watch, recorder = flight.pilot, flight.watch, flight.recorder
     period = {name: steps_per(parts.step_s, name, 1.0 / rate) for name, rate in parts.rates_hz().items()}
     last_step = math.ceil(parts.mission.time_limit_s / parts.step_s)
-    stuck_steps = math.ceil(parts.stuck_s / parts.step_s)
+    estimate = state = _hover(world)
     outcome: Outcome | None = None
     tracks, bodies = Tracks.none(), parts.movers.at(0.0)
-    scene.place(bodies)
+    flight.scene.place(bodies)
 
     for step in range(last_step + 1):
         time_s = step * parts.step_s
@@ -134,34 +134,98 @@ def fly(parts: Parts, world: World, seed: int, progress: Progress | None = None)
         if step % period["mapping.esdf_rate_hz"] == 0:
             with watch.lap("esdf"):
                 update = parts.mapping.update(time_s)
-        observation = _observe(parts, world, pilot, time_s, estimate, reference, update, tracks)
+        observation = flight.observe(time_s, estimate, reference, update, tracks)
         if step % period["explorer.rate_hz"] == 0:
             pilot.explore(observation)
-            observation = _observe(parts, world, pilot, time_s, estimate, reference, update, tracks)
+            observation = flight.observe(time_s, estimate, reference, update, tracks)
         if step % period["mapping.esdf_rate_hz"] == 0:
             recorder.tick(observation, pilot.decide(observation))
         if step % period["controller.rate_hz"] == 0:
             with watch.lap("control"):
                 command = parts.controller.command(estimate, reference)
         recorder.step(time_s, state, estimate, reference, bodies)
-        outcome = parts.mission.outcome(state, observation)
-        if outcome is None and step % 100 == 0 and recorder.moved_m(stuck_steps) < 0.3:
-            outcome = Outcome.STUCK if pilot.ever_planned else Outcome.NO_PLAN
-        if outcome is Outcome.EXPLORED and not pilot.ever_planned:
-            outcome = Outcome.NO_PLAN
+        outcome = flight.outcome(step, state, observation)
         if outcome is not None:
             break
         with watch.lap("vehicle"):
             moved = parts.vehicle.step(command, parts.step_s)
             bodies = parts.movers.at(time_s + parts.step_s)
-            scene.place(bodies)
-            state, touched = contact.advance(state, moved, time_s + parts.step_s)
+            flight.scene.place(bodies)
+            state, touched = flight.contact.advance(state, moved, time_s + parts.step_s)
             if touched:
                 parts.vehicle.place(state)
         estimate = parts.estimator.estimate(state, parts.step_s)
-        if progress is not None and step % 100 == 0:
+        if progress is not None and step % _LOOK_STEPS == 0:
             progress(time_s, f"{len(pilot.replans)} plans")
-    return _log(parts, world, scene, pilot, recorder, contact, outcome or Outcome.TIMEOUT, watch)
+    return flight.log(outcome or Outcome.TIMEOUT)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Flight:
+    """What one trial is flown with; all of it has begun."""
+
+    parts: Parts
+    world: World
+    scene: Scene
+    pilot: Piloting
+    contact: ContactTracker
+    recorder: Recorder
+    watch: Stopwatch
+
+    def observe(
+        self, time_s: float, estimate: State, reference: Reference, update: MapUpdate, tracks: Tracks
+    ) -> Observation:
+        """What the deciding roles see now."""
+        return Observation(
+            time_s=time_s,
+            state=estimate,
+            reference=reference,
+            trajectory=self.pilot.trajectory,
+            field=self.parts.mapping.field,
+            update=update,
+            goal=self.pilot.goal,
+            best_goal=self.pilot.best_goal,
+            target_m=self.parts.mission.target_m,
+            flight_bounds_m=self.world.flight_bounds_m,
+            tracks=tracks,
+        )
+
+    def outcome(self, step: int, state: State, observation: Observation) -> Outcome | None:
+        """How the flight has ended: as the mission judges, or because nothing moves; None: it goes on."""
+        outcome = self.parts.mission.outcome(state, observation)
+        if outcome is None and step % _LOOK_STEPS == 0:
+            stuck_steps = math.ceil(self.parts.stuck_s / self.parts.step_s)
+            outcome = Outcome.STUCK if self.recorder.moved_m(stuck_steps) < _STILL_M else None
+        unplanned = outcome in (Outcome.STUCK, Outcome.EXPLORED) and not self.pilot.ever_planned
+        return Outcome.NO_PLAN if unplanned else outcome
+
+    def log(self, outcome: Outcome) -> TrialLog:
+        """Everything that was recorded."""
+        parts, pilot, field = self.parts, self.pilot, self.parts.mapping.field
+        limits, exploring = parts.vehicle.limits, parts.mission.target_m is None
+        return self.recorder.log(
+            outcome=outcome,
+            reason=self._reason(outcome),
+            step_s=parts.step_s,
+            scene=self.scene,
+            field=field,
+            replans=tuple(pilot.replans),
+            dropped_triggers=pilot.dropped_triggers,
+            contacts=self.contact.contacts,
+            first_plan=pilot.first_plan,
+            limits=limits,
+            inspection=parts.mission.findings(),
+            seen_share=seen_share(self.world, self.scene, field, limits) if exploring else math.nan,
+            watch=self.watch,
+        )
+
+    def _reason(self, outcome: Outcome) -> str:
+        if outcome in (Outcome.REACHED, Outcome.EXPLORED, Outcome.INSPECTED):
+            return ""
+        if outcome is Outcome.TIMEOUT:
+            return f"not there after {self.parts.mission.time_limit_s:g} s"
+        why = f"; {self.pilot.failure}" if self.pilot.failure else ", and nothing asked for a new plan"
+        return f"has not moved for {self.parts.stuck_s:g} s{why}"
 
 
 def _hover(world: World) -> State:
@@ -173,9 +237,9 @@ def _hover(world: World) -> State:
     )
 
 
-def _begin(parts: Parts, world: World, scene: Scene, start: State, seed: int, watch: Stopwatch) -> Piloting:
+def _begin(parts: Parts, world: World, seed: int) -> _Flight:
     """Give every part its trial's context and its own random stream."""
-    limits = parts.vehicle.limits
+    scene, limits, watch = Scene(world), parts.vehicle.limits, Stopwatch()
     parts.movers.reset(world, scene, limits, generator(seed, Stream.MOVERS))
     parts.detection.reset(limits, generator(seed, Stream.DETECTION))
     parts.sensor.reset(scene, generator(seed, Stream.SENSOR))
@@ -185,7 +249,7 @@ def _begin(parts: Parts, world: World, scene: Scene, start: State, seed: int, wa
     parts.trigger.reset(limits)
     parts.planner.reset(limits, generator(seed, Stream.PLANNER))
     parts.controller.reset(limits, parts.vehicle.mass_kg)
-    parts.vehicle.reset(start)
+    parts.vehicle.reset(_hover(world))
     parts.safety.reset(limits)
     with watch.lap("mission"):
         parts.mission.reset(world, scene, limits)
@@ -203,68 +267,12 @@ def _begin(parts: Parts, world: World, scene: Scene, start: State, seed: int, wa
         flight_bounds_m=world.flight_bounds_m,
         watch=watch,
     )
-    return parts.pilot.begin(crew)
-
-
-def _observe(
-    parts: Parts,
-    world: World,
-    pilot: Piloting,
-    time_s: float,
-    estimate: State,
-    reference: Reference,
-    update: MapUpdate,
-    tracks: Tracks,
-) -> Observation:
-    return Observation(
-        time_s=time_s,
-        state=estimate,
-        reference=reference,
-        trajectory=pilot.trajectory,
-        field=parts.mapping.field,
-        update=update,
-        goal=pilot.goal,
-        best_goal=pilot.best_goal,
-        target_m=parts.mission.target_m,
-        flight_bounds_m=world.flight_bounds_m,
-        tracks=tracks,
-    )
-
-
-def _log(
-    parts: Parts,
-    world: World,
-    scene: Scene,
-    pilot: Piloting,
-    recorder: Recorder,
-    contact: ContactTracker,
-    outcome: Outcome,
-    watch: Stopwatch,
-) -> TrialLog:
-    exploring = parts.mission.target_m is None
-    return recorder.log(
-        outcome=outcome,
-        reason=_reason(parts, pilot, outcome),
-        step_s=parts.step_s,
+    return _Flight(
+        parts=parts,
+        world=world,
         scene=scene,
-        field=parts.mapping.field,
-        replans=tuple(pilot.replans),
-        dropped_triggers=pilot.dropped_triggers,
-        contacts=contact.contacts,
-        first_plan=pilot.first_plan,
-        limits=parts.vehicle.limits,
-        inspection=parts.mission.findings(),
-        seen_share=seen_share(world, scene, parts.mapping.field, parts.vehicle.limits)
-        if exploring
-        else math.nan,
+        pilot=parts.pilot.begin(crew),
+        contact=ContactTracker(scene=scene, body_size_m=limits.body_size_m),
+        recorder=Recorder(),
         watch=watch,
     )
-
-
-def _reason(parts: Parts, pilot: Piloting, outcome: Outcome) -> str:
-    if outcome in (Outcome.REACHED, Outcome.EXPLORED, Outcome.INSPECTED):
-        return ""
-    if outcome is Outcome.TIMEOUT:
-        return f"not there after {parts.mission.time_limit_s:g} s"
-    still = f"has not moved for {parts.stuck_s:g} s"
-    return f"{still}; {pilot.failure}" if pilot.failure else f"{still}, and nothing asked for a new plan"
