@@ -7,10 +7,10 @@ import platform
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, get_type_hints
+from typing import Annotated, Any
 
-from uavexp.errors import require, require_option
-from uavexp.parameters import check_value
+from uavexp.errors import require
+from uavexp.parameters import Constraint, Positive, check_value, parameter_types
 from uavexp.sweep.job import Limits
 
 
@@ -31,19 +31,17 @@ class Queue(StrEnum):
 class Runner:
     """The parameters of `conf/runner/*.yaml`."""
 
-    backend: str
-    n_jobs: int
-    timeout_s: float
-    memory_mb: float
+    backend: Backend
+    n_jobs: Annotated[int, Constraint("-1 or >= 1", lambda n_jobs: n_jobs == -1 or n_jobs >= 1)]
+    timeout_s: Positive
+    memory_mb: Positive
     dry_run: bool
     accept_other_code: bool
     address: str | None
-    queue: str | None
+    queue: Queue | None
 
     def __post_init__(self) -> None:
-        require_option("runner.backend", self.backend, Backend)
         if self.queue is not None:
-            require_option("runner.queue", self.queue, Queue)
             require(self.n_jobs >= 1, "runner.queue=slurm needs runner.n_jobs=N, the workers to ask for")
             require(
                 self.address is None,
@@ -51,10 +49,6 @@ class Runner:
             )
         if self.backend != Backend.DASK:
             require(self.address is None and self.queue is None, "runner.address and queue need runner=dask")
-        require(self.n_jobs == -1 or self.n_jobs >= 1, f"runner.n_jobs must be -1 or >= 1, got {self.n_jobs}")
-        for name in ("timeout_s", "memory_mb"):
-            value = getattr(self, name)
-            require(0.0 < value < float("inf"), f"runner.{name} must be > 0 and finite, got {value:g}")
 
     @property
     def workers(self) -> int:
@@ -79,7 +73,7 @@ def read_runner(tree: Mapping[str, Any]) -> Runner:
     Raises:
         ConfigError: a value of the wrong type or out of range.
     """
-    kinds = get_type_hints(Runner)
+    kinds = parameter_types(Runner)
     return Runner(**{name: check_value(f"runner.{name}", value, kinds[name]) for name, value in tree.items()})
 
 
