@@ -9,8 +9,6 @@ from __future__ import annotations
 import zlib
 from dataclasses import dataclass
 
-OTHER = "other"  # the pilot's own replans, counted together
-
 
 @dataclass(frozen=True, slots=True)
 class Cause:
@@ -19,7 +17,7 @@ class Cause:
     name: str  # in logs, records and tables
     label: str
     colour: str  # mostly Okabe and Ito 2008, as in `report.style`
-    marker: str  # of matplotlib
+    marker: str  # of matplotlib, a filled one
 
 
 MAP = Cause("map", "the map changed near the path", "#E69F00", "^")
@@ -37,9 +35,10 @@ FIRST = Cause("first", "no plan was flown yet", "#606060", "*")
 RETRY = Cause("retry", "the last request brought no plan", "#606060", "P")
 BRAKE = Cause("brake", "after an emergency stop", "#000000", "v")
 PILOT = (FIRST, RETRY, BRAKE)
+OTHER = Cause("other", "the pilot's own, counted together", "#606060", "P")
 
-_SPARE = (("#606060", "d"), ("#882255", "H"), ("#0072B2", "8"), ("#D55E00", "1"), ("#009E73", "2"))
-_BY_NAME = {cause.name: cause for cause in (*POLICY, *PILOT)}
+_SPARE = (("#606060", "d"), ("#882255", "H"), ("#0072B2", "8"), ("#D55E00", "d"), ("#009E73", "H"))
+_BY_NAME = {cause.name: cause for cause in (*POLICY, *PILOT, OTHER)}
 
 
 def cause_named(name: str) -> Cause:

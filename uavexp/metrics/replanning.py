@@ -26,7 +26,7 @@ _COUNT = "replans_"  # and the cause
 _NOT_MEASURED = "the log does not tell"
 
 
-COUNTED = (*(cause.name for cause in causes.POLICY), causes.OTHER)
+COUNTED = (*(cause.name for cause in causes.POLICY), causes.OTHER.name)
 
 
 def executed(log: TrialLog) -> tuple[Replan, ...]:
@@ -47,7 +47,7 @@ def count_by_cause(replans: Sequence[Replan]) -> dict[str, int]:
     The pilot's own count together, as `other`.
     """
     pilots = {cause.name for cause in causes.PILOT}
-    counted = Counter(causes.OTHER if replan.cause in pilots else replan.cause for replan in replans)
+    counted = Counter(causes.OTHER.name if replan.cause in pilots else replan.cause for replan in replans)
     return {name: counted[name] for name in (*COUNTED, *(set(counted) - set(COUNTED)))}
 
 
@@ -171,6 +171,12 @@ def _count_of(cause: str) -> Measure:
 def cause_metric(cause: str) -> Metric:
     """The column of the replans of one cause."""
     return Metric(column=f"{_COUNT}{cause}", title=f"Replans, cause {cause}", digits=1, is_count=True)
+
+
+def cause_of(metric: Metric) -> str | None:
+    """The cause whose replans a metric counts; None for another metric."""
+    cause = metric.column.removeprefix(_COUNT)
+    return cause if metric == cause_metric(cause) else None
 
 
 def _of_blocked(figure: Callable[[Answers], int | float]) -> Measure:

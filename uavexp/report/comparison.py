@@ -12,8 +12,9 @@ import pandas as pd
 
 from uavexp.arrays import Bool, Float, Int
 from uavexp.errors import RecordError
+from uavexp.metrics.metric import Metric
 from uavexp.report import significance, statistics
-from uavexp.report.labels import RATE, Metric
+from uavexp.report.labels import RATE
 from uavexp.report.significance import Alternative
 from uavexp.report.statistics import Interval
 

@@ -25,9 +25,10 @@ from typing import Any
 
 from uavexp.config.trust import is_trusted, trusted_packages
 from uavexp.errors import ConfigError
+from uavexp.metrics.metric import Metric
 from uavexp.parameters import nearest
 from uavexp.report import judges
-from uavexp.report.labels import TABLE_1, Metric, metrics_of
+from uavexp.report.labels import TABLE_1, metrics_of
 from uavexp.report.results import Results
 from uavexp.store.study import Study
 

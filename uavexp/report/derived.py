@@ -6,10 +6,28 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from uavexp.report.labels import FALSE_TRIGGERS, Metric
+from uavexp.metrics.metric import Flight, Metric
 from uavexp.store.study import Study
 
-USEFUL_CHANGE_M = 0.10  # m; a replan that departs less from the old path was wasted (`metrics.summary`)
+USEFUL_CHANGE_M = Flight.useful_change_m  # a replan that departs less from the old path was wasted
+WASTED = Metric(column="wasted_replans", title="Wasted replans", digits=1, better=-1, is_count=True)
+USEFUL_SHARE = Metric(
+    column="useful_share",
+    title="Useful replans",
+    unit="%",
+    digits=0,
+    better=1,
+    scale=100.0,
+    missing="there was no replan",
+)
+FALSE_TRIGGERS = Metric(
+    column="false_triggers_per_min",
+    title="False triggers",
+    unit="1/min",
+    better=-1,
+    missing="the trial did not run to its end",
+)
+METRICS = (WASTED, USEFUL_SHARE, FALSE_TRIGGERS)
 
 
 def with_derived(study: Study, metrics: Sequence[Metric]) -> pd.DataFrame:
@@ -26,7 +44,8 @@ def with_replan_shares(trials: pd.DataFrame) -> pd.DataFrame:
         return trials
     replans = trials["replans"].astype(float)
     useful = trials["useful_replans"].astype(float)
-    return trials.assign(wasted_replans=replans - useful, useful_share=useful / replans.where(replans > 0))
+    shares = {WASTED.column: replans - useful, USEFUL_SHARE.column: useful / replans.where(replans > 0)}
+    return trials.assign(**shares)
 
 
 def with_false_triggers(trials: pd.DataFrame, replans: pd.DataFrame) -> pd.DataFrame:

@@ -14,9 +14,9 @@ import numpy as np
 
 from uavexp.arrays import Float, Int
 from uavexp.bodies import present
+from uavexp.causes import cause_named
 from uavexp.log import Replan, TrialLog
 from uavexp.metrics import path, replanning, tracking
-from uavexp.report import replan_marks
 from uavexp.report.flights import RULE, SharedWorld, scene_at, shared_world, three_arms
 from uavexp.report.looks import looks_of
 from uavexp.report.results import Results
@@ -24,14 +24,8 @@ from uavexp.types import World
 
 MOST_POINTS = 600  # of a path
 _ABOVE_FLIGHT_M = 0.3  # the map is cut here at first, so that one looks into the rooms
-# the shapes that plotly has in three dimensions
-_SYMBOLS = {
-    "map": "diamond",
-    "goal": "circle",
-    "clock": "square",
-    "collision": "x",
-    "distance": "circle-open",
-}
+# the shapes that plotly has in three dimensions, by marker
+_SYMBOLS = {"^": "diamond", "D": "circle", "s": "square", "X": "x", "o": "circle-open"}
 _OTHER_SYMBOL = "cross"
 
 Json = dict[str, Any]
@@ -160,13 +154,14 @@ def _headline(log: TrialLog) -> str:
 
 
 def _replan(number: int, replan: Replan) -> Json:
+    cause = cause_named(replan.cause)
     moved = f"<br>path moved by {replan.path_change_m:.2f} m" if np.isfinite(replan.path_change_m) else ""
     changed = f"<br>{len(replan.changed_m)} changed voxels" if len(replan.changed_m) else ""
     return {
         "at": _numbers(replan.position_m),
         "cause": replan.cause,
-        "colour": replan_marks.cause_mark(replan.cause).colour,
-        "symbol": _SYMBOLS.get(replan.cause, _OTHER_SYMBOL),
+        "colour": cause.colour,
+        "symbol": _SYMBOLS.get(cause.marker, _OTHER_SYMBOL),
         "hover": f"replan {number}: {replan.cause}<br>{replan.time_s:.1f} s{moved}{changed}",
     }
 

@@ -13,6 +13,7 @@ from enum import StrEnum
 
 import numpy as np
 
+from uavexp.metrics.metric import Metric
 from uavexp.report import number_format, statistics
 from uavexp.report.comparison import (
     FEWEST_SCENES,
@@ -22,7 +23,7 @@ from uavexp.report.comparison import (
     interval_of,
     pairs_of,
 )
-from uavexp.report.labels import CLEARANCE, RATE, REPLANS, Metric
+from uavexp.report.labels import CLEARANCE, RATE, REPLANS
 from uavexp.report.paired import PairedTest, paired_tests
 from uavexp.report.results import Results
 from uavexp.report.significance import ALPHA, holm, smallest_p

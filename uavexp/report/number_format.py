@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from uavexp.metrics.metric import Metric
 from uavexp.report.comparison import Difference, Estimate
-from uavexp.report.labels import Metric
 from uavexp.report.statistics import Interval
 
 NONE = "–"

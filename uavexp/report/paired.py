@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from uavexp.metrics.metric import Metric
 from uavexp.report.comparison import Difference, Pairs, Panel, compare, pairs_of
-from uavexp.report.labels import Metric
 from uavexp.report.significance import holm
 
 

@@ -15,6 +15,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from uavexp.causes import cause_named
 from uavexp.log import TrialLog
 from uavexp.metrics import replanning
 from uavexp.report import inspection_view, movers_view, plan_view, replan_marks, style
@@ -118,9 +119,7 @@ def _draw_tracking(axes: Axes, log: TrialLog) -> None:
     for replan in replanning.failed(log):
         axes.plot(replan.time_s, 1.0, **replan_marks.failed_marker(replan.cause, size_pt), **top)
     for replan in replanning.executed(log):
-        axes.axvline(
-            replan.time_s, color=replan_marks.cause_mark(replan.cause).colour, lw=0.7, alpha=0.8, zorder=1
-        )
+        axes.axvline(replan.time_s, color=cause_named(replan.cause).colour, lw=0.7, alpha=0.8, zorder=1)
         axes.plot(replan.time_s, 1.0, **replan_marks.marker(replan.cause, size_pt), **top)
     axes.set_ylim(bottom=0.0)
     axes.set(xlabel="time [s]", ylabel="tracking error [m]")

@@ -3,55 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from uavexp.causes import cause_named
 from uavexp.log import TrialLog
 from uavexp.metrics import replanning
-from uavexp.report import style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-@dataclass(frozen=True, slots=True)
-class Mark:
-    """How one cause of replanning is drawn: never by colour alone."""
-
-    colour: str
-    marker: str
-
-
-CAUSE_MARKS = {
-    "map": Mark(style.ORANGE, "^"),
-    "goal": Mark(style.GREEN, "D"),
-    "clock": Mark(style.PURPLE, "s"),
-    "distance": Mark(style.SKY, "o"),
-    "collision": Mark(style.VERMILLION, "X"),
-    "covered": Mark(style.BLUE, "p"),
-    "expired": Mark(style.YELLOW, "h"),
-    "arrival": Mark("#8C6D31", "<"),
-    "brake": Mark(style.BLACK, "v"),
-    "risk": Mark(style.WINE, ">"),
-}
-OTHER_MARK = Mark("#606060", "P")
-
-
-def cause_mark(cause: str) -> Mark:
-    """Return how a replan of this cause is drawn."""
-    return CAUSE_MARKS.get(cause, OTHER_MARK)
-
-
 def marker(cause: str, size_pt: float) -> dict[str, Any]:
     """Line2D settings of a replan that took effect."""
-    look = cause_mark(cause)
+    look = cause_named(cause)
     fill = {"color": look.colour, "mec": "white", "mew": 0.6}
     return {"marker": look.marker, "ls": "", "ms": size_pt, **fill}
 
 
 def failed_marker(cause: str, size_pt: float) -> dict[str, Any]:
     """Line2D settings of a request that brought no plan: the same, hollow."""
-    look = cause_mark(cause)
+    look = cause_named(cause)
     hollow = {"color": look.colour, "mfc": "white", "mew": 1.2}
     return {"marker": look.marker, "ls": "", "ms": 0.8 * size_pt, **hollow}
 
@@ -60,7 +31,7 @@ def draw_replans(axes: Axes, log: TrialLog, size_pt: float) -> None:
     """Mark the replans that took effect along the upper edge, by cause."""
     top: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "clip_on": False, "zorder": 5}
     for replan in replanning.executed(log):
-        look = cause_mark(replan.cause)
+        look = cause_named(replan.cause)
         axes.axvline(replan.time_s, color=look.colour, lw=0.6, alpha=0.7, zorder=1)
         axes.plot(replan.time_s, 1.0, **marker(replan.cause, size_pt), **top)
 
@@ -73,7 +44,7 @@ def causes_in_words(logs: Iterable[TrialLog]) -> str:
 
 def causes_key(causes: list[str]) -> str:
     """Which marker stands for which cause."""
-    return ", ".join(f"{cause}: {_SHAPES[cause_mark(cause).marker]}" for cause in causes) or "none"
+    return ", ".join(f"{cause}: {_SHAPES[cause_named(cause).marker]}" for cause in causes) or "none"
 
 
 _SHAPES = {
@@ -85,6 +56,11 @@ _SHAPES = {
     "p": "pentagon",
     "h": "hexagon",
     "<": "triangle to the left",
+    ">": "triangle to the right",
     "v": "triangle down",
     "P": "plus",
+    "*": "star",
+    "d": "narrow diamond",
+    "H": "upright hexagon",
+    "8": "octagon",
 }

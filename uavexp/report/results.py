@@ -9,9 +9,11 @@ from functools import cached_property
 import numpy as np
 import pandas as pd
 
+from uavexp.metrics.metric import Metric
+from uavexp.metrics.replanning import cause_of
 from uavexp.report.comparison import FEWEST_SCENES, SCENE, Panel, arm_names, panel_of
 from uavexp.report.derived import with_derived
-from uavexp.report.labels import CAUSE_COLUMNS, Metric
+from uavexp.report.labels import with_own_causes
 from uavexp.report.paired import PairedTest, paired_tests
 from uavexp.report.printed import Reference, read_reference
 from uavexp.store.study import Study
@@ -118,12 +120,15 @@ class Results:
         return paired_tests(self.panel, self.compared, self.comparisons)
 
     def occurring(self, metrics: Sequence[Metric]) -> list[Metric]:
-        """The metrics that the trials have, without causes of replanning that never occurred."""
+        """The metrics that the trials have, without causes of replanning that never occurred.
+
+        Where all shipped causes are asked for, causes of one's own follow them.
+        """
         return [
             metric
-            for metric in metrics
+            for metric in with_own_causes(metrics, self.trials.columns)
             if self.panel.has(metric)
-            and (metric.column not in CAUSE_COLUMNS or np.nansum(self.panel.block(metric)) > 0.0)
+            and (cause_of(metric) is None or np.nansum(self.panel.block(metric)) > 0.0)
         ]
 
     @cached_property

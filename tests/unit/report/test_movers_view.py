@@ -18,7 +18,7 @@ from uavexp.bodies import ABSENT_M
 from uavexp.log import Contact, TrialLog
 from uavexp.metrics.evaluate import evaluate
 from uavexp.metrics.tracking_movers import near_misses
-from uavexp.report import flight3d, labels, movers_view, picture, picture_layout, plan_view
+from uavexp.report import flight3d, movers_view, picture, picture_layout, plan_view
 from uavexp.report.flight3d import _movers
 from uavexp.types import Shape
 
@@ -309,13 +309,3 @@ def test_the_view_in_3d_breaks_a_path_where_the_mover_is_not_there():
     ]
     assert movers["last"][1] == [11.5, 7.0]
     assert "movers" not in flight3d._flight(make_world([]), make_log(straight, straight_velocity))
-
-
-def test_every_metric_of_movers_has_its_line_in_the_report():
-    log = flight()
-    measured = set(evaluate(log, make_world([]))) - set(
-        evaluate(make_log(straight, straight_velocity), make_world([]))
-    )
-    assert {metric.column for metric in labels.MOVERS} == measured - {"near_miss_distance_m"}
-    assert labels.metrics_of(metric.column for metric in labels.MOVERS) == labels.MOVERS
-    assert "replans_risk" in labels.CAUSE_COLUMNS

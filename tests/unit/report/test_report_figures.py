@@ -11,15 +11,17 @@ import pytest
 from matplotlib.text import Text
 
 from tests.studies import copy_of, flown, made_up, shipped  # noqa: F401
+from uavexp.causes import cause_named
 from uavexp.metrics import replanning
+from uavexp.metrics.replanning import COUNTED, cause_metric
 from uavexp.report import flights as shown_flights
-from uavexp.report import replan_marks, style
+from uavexp.report import style
 from uavexp.report.contents import Report
+from uavexp.report.derived import FALSE_TRIGGERS
 from uavexp.report.figures import base
 from uavexp.report.figures.base import png_of
 from uavexp.report.figures.minimum_clearance import crowding
 from uavexp.report.figures.trade_off import curves_of
-from uavexp.report.labels import FALSE_TRIGGERS
 from uavexp.report.results import ARM, Results
 from uavexp.store.study import LOG, TRIALS, WORLDS
 
@@ -123,7 +125,7 @@ class TestPaths:
     def test_figure_9_has_a_marker_for_every_replan_of_the_scene(self, flown, drawings):  # noqa: F811
         flights, scene = Results(study=flown).trials, Results(study=flown).scenes[0]
         expected = shown_flights.executed(flown.replans, flights[flights["scene"] == scene])
-        causes = {replan_marks.cause_mark(cause).colour for cause in expected["cause"]}
+        causes = {cause_named(cause).colour for cause in expected["cause"]}
         lines = [line for axes in drawings["figure_9"].figure.axes for line in axes.lines]
         drawn = sum(
             len(line.get_xdata())
@@ -266,6 +268,18 @@ def test_policies_show_the_shares_of_causes_and_of_useful_replans(tmp_path):
     assert [float(line.get_xdata()[0]) for line in delay.lines if line.get_marker() == "o"] == pytest.approx(
         [0.1]
     )
+
+
+def test_causes_of_ones_own_are_drawn_after_the_ten_shipped(tmp_path):
+    arms = ("MCR", "TBR")
+    table = rows_of(arms, ("a", "b"), 3, success=True, replans=12.0, useful_replans=6.0)
+    shipped_causes = {cause_metric(cause).column: 1.0 for cause in COUNTED}
+    table = table.assign(**shipped_causes, replans_mine=2.0)
+    study = made_up(tmp_path, table, {"arm": arms, "scene": ("a", "b")}, report=shipped("mcr/policies"))
+    drawing = {item.name: item for item in Report(study=study).drawings()}["policies_replans"]
+    _, names = drawing.figure.axes[1].get_legend_handles_labels()
+    assert names == [*COUNTED, "mine"]
+    assert drawing.figure.axes[1].patches[-1].get_width() == pytest.approx(100.0 * 2.0 / 12.0)
 
 
 def test_robustness_draws_every_level_at_its_mean(tmp_path):

@@ -16,6 +16,7 @@ import pytest
 
 from tests.studies import shipped
 from uavexp.errors import RecordError
+from uavexp.metrics.evaluate import metric_of
 from uavexp.report import labels, number_format, table_formats
 from uavexp.report.comparison import compare, estimate, pairs_of, panel_of
 from uavexp.report.contents import Judgement, Report
@@ -351,7 +352,7 @@ def test_a_count_that_never_occurred_is_bounded_and_other_equal_values_have_no_i
     panel = Results(study=study_of(trials)).panel
     contacts, unsafe, replans = (
         number_format.mean_with_interval(estimate(panel, metric, "MCR"), metric, 60)
-        for metric in (labels.CONTACTS, labels.UNSAFE, labels.REPLANS)
+        for metric in (labels.CONTACTS, metric_of("time_below_safety_s"), labels.REPLANS)
     )
     assert contacts == "0.00 [0.00, 0.06]"  # 3.69 / 60
     assert unsafe == "0.00"

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from uavexp.report.labels import Metric
+from uavexp.metrics.metric import Metric
 from uavexp.report.printed import Reference
 
 if TYPE_CHECKING:

@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from uavexp.metrics.metric import Metric
 from uavexp.report.comparison import Panel, estimate
+from uavexp.report.derived import FALSE_TRIGGERS
 from uavexp.report.figures import base
 from uavexp.report.figures.base import Drawing
-from uavexp.report.labels import CLEARANCE, FALSE_TRIGGERS, RATE, Metric
+from uavexp.report.labels import CLEARANCE, RATE
 from uavexp.report.looks import CLOCK, OTHERS, PRIMARY, Look
 from uavexp.report.results import Results
 

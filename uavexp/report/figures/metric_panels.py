@@ -7,10 +7,10 @@ import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from uavexp.metrics.metric import Metric
 from uavexp.report.comparison import Panel, estimate
 from uavexp.report.figures import base
 from uavexp.report.figures.base import Drawing
-from uavexp.report.labels import Metric
 from uavexp.report.looks import Look, looks_of
 from uavexp.report.results import Results
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import pandas as pd
 from matplotlib.lines import Line2D
 
+from uavexp import causes
 from uavexp.report import replan_marks, style
 from uavexp.report.comparison import SCENE
 from uavexp.report.figures import base
@@ -48,11 +49,16 @@ def figure(results: Results, *, name: str) -> Drawing | None:
         axes.set_axis_off()
     drawn.supylabel("seed", fontsize=9)
     drawn.supxlabel("time [s]", fontsize=9)
-    known = [cause for cause in replan_marks.CAUSE_MARKS if (taken["cause"] == cause).any()]
-    causes = [*known, *sorted(set(taken["cause"]) - set(known))]
-    drawn.legend(handles=_key(causes), loc="outside upper center", ncols=len(causes) + 2, fontsize=8)
+    key = _key(_in_order(set(taken["cause"])))
+    drawn.legend(handles=key, loc="outside upper center", ncols=len(key), fontsize=8)
     caption = _caption(arms, scene, [int(seed) for seed in seeds], flights)
     return Drawing(name=name, caption=caption, figure=drawn)
+
+
+def _in_order(given: set[str]) -> list[str]:
+    """The shipped causes as they are declared, then the others by name."""
+    shipped = [cause.name for cause in (*causes.POLICY, *causes.PILOT) if cause.name in given]
+    return [*shipped, *sorted(given - set(shipped))]
 
 
 def _draw_panel(
@@ -80,9 +86,9 @@ def _draw_panel(
     base.tidy(axes, grid="x")
 
 
-def _key(causes: Sequence[str]) -> list[Line2D]:
+def _key(names: Sequence[str]) -> list[Line2D]:
     return [
-        *(Line2D([], [], label=cause, **replan_marks.marker(cause, 5.0)) for cause in causes),
+        *(Line2D([], [], label=name, **replan_marks.marker(name, 5.0)) for name in names),
         Line2D([], [], color=style.BLACK, marker="|", ls="", mew=1.3, label="end: success"),
         Line2D([], [], color=style.VERMILLION, marker="x", ls="", mew=1.3, label="end: failure"),
     ]

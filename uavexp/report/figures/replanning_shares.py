@@ -8,17 +8,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from uavexp.report import replan_marks, style
+from uavexp.causes import cause_named
+from uavexp.metrics.evaluate import metric_of
+from uavexp.metrics.metric import Metric
+from uavexp.metrics.replanning import cause_of
+from uavexp.report import style
 from uavexp.report.comparison import Panel, estimate
+from uavexp.report.derived import WASTED
 from uavexp.report.figures import base
 from uavexp.report.figures.base import Drawing
-from uavexp.report.labels import BLOCKED_DELAY, CAUSE_METRICS, REPLANS, USEFUL_REPLANS, WASTED, Metric
+from uavexp.report.labels import BLOCKED_DELAY, CAUSE_METRICS, REPLANS
 from uavexp.report.results import Results
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-WORTH = (USEFUL_REPLANS, WASTED)
+WORTH = (metric_of("useful_replans"), WASTED)
 METRICS = (*CAUSE_METRICS, *WORTH, REPLANS, BLOCKED_DELAY)
 
 Fill = tuple[str, str]  # colour, hatch
@@ -33,7 +38,7 @@ def figure(results: Results, *, name: str) -> Drawing:
     parts = drawn.subplots(1, 4, sharey=True, width_ratios=(1.0, 1.5, 0.9, 0.9))
     often, causes, worth, delay = parts
     _draw_estimates(often, panel, REPLANS)
-    _draw_shares(causes, panel, occurring, _cause_fills())
+    _draw_shares(causes, panel, occurring, _cause_fills(occurring))
     _draw_shares(worth, panel, WORTH, _WORTH_FILLS)
     _draw_estimates(delay, panel, BLOCKED_DELAY)
     often.set_xscale("symlog", linthresh=1.0, linscale=0.35)
@@ -57,11 +62,11 @@ _CAPTION = (
 )
 
 
-def _cause_fills() -> dict[str, Fill]:
+def _cause_fills(metrics: Sequence[Metric]) -> dict[str, Fill]:
     """Of any number of causes: the hatches come again, with another colour."""
+    hatched = dict(zip(dict.fromkeys((*CAUSE_METRICS, *metrics)), cycle(_HATCHES), strict=False))
     return {
-        metric.column: (replan_marks.cause_mark(metric.column.removeprefix("replans_")).colour, hatch)
-        for metric, hatch in zip(CAUSE_METRICS, cycle(_HATCHES), strict=False)
+        metric.column: (cause_named(cause_of(metric) or "").colour, hatched[metric]) for metric in metrics
     }
 
 

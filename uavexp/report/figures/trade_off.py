@@ -10,10 +10,11 @@ import numpy as np
 import pandas as pd
 from matplotlib.patheffects import withStroke
 
+from uavexp.metrics.metric import Metric
 from uavexp.report.comparison import Panel, estimate
 from uavexp.report.figures import base
 from uavexp.report.figures.base import Drawing
-from uavexp.report.labels import CLEARANCE, RATE, REPLANS, Metric
+from uavexp.report.labels import CLEARANCE, RATE, REPLANS
 from uavexp.report.looks import Look, looks_of
 from uavexp.report.results import ARM, Results
 

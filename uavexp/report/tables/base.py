@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from uavexp.report.labels import Metric
+from uavexp.metrics.metric import Metric
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from uavexp.arrays import Bool, Float
+from uavexp.metrics.metric import Metric
 from uavexp.report import number_format
 from uavexp.report.comparison import Panel, estimate
-from uavexp.report.labels import CLEARANCE, RATE, REPLANS, Metric
+from uavexp.report.labels import CLEARANCE, RATE, REPLANS
 from uavexp.report.results import FAILED, INTERVALS, Results
 from uavexp.report.tables.base import Table
 

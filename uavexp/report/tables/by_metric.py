@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterator, Sequence
 from itertools import product
 
+from uavexp.metrics.metric import Metric
 from uavexp.report import number_format
 from uavexp.report.comparison import estimate
-from uavexp.report.labels import Metric
 from uavexp.report.results import FAILED, INTERVALS, Results
 from uavexp.report.tables.base import Table
 

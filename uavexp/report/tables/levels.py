@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from uavexp.metrics.metric import Metric
 from uavexp.report import number_format
 from uavexp.report.comparison import Panel, compare, estimate, pairs_of
-from uavexp.report.labels import Metric
 from uavexp.report.results import FAILED, INTERVALS, Results
 from uavexp.report.tables.base import Table
 

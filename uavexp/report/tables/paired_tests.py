@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from uavexp.metrics.metric import Metric
 from uavexp.report import number_format
 from uavexp.report.comparison import FEWEST_SCENES
 from uavexp.report.judges import RULE
-from uavexp.report.labels import Metric
 from uavexp.report.paired import PairedTest
 from uavexp.report.results import Results
 from uavexp.report.tables.base import Table

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from uavexp.metrics.metric import Metric
 from uavexp.report.comparison import estimate
-from uavexp.report.labels import Metric
 from uavexp.report.results import Results
 from uavexp.report.tables.base import Table
 
