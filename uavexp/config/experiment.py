@@ -61,13 +61,19 @@ class LabelledCell:
 
 
 def list_experiments(user_folder: Path | None = None) -> dict[str, Path]:
-    """File of every experiment by its name, `<paper>/<table>`: the shipped ones, then the user's."""
-    folders = [experiments_folder(), *([user_folder / "experiments"] if user_folder else [])]
-    return {
-        f"{file.parent.name}/{file.stem}": file
-        for folder in folders
-        for file in sorted(folder.glob("*/*.yaml"))
-    }
+    """File of every experiment by its name, `<paper>/<table>`: the shipped ones, then the user's.
+
+    Raises:
+        ConfigError: a user's experiment has the name of a shipped one.
+    """
+    found: dict[str, Path] = {}
+    for folder in (experiments_folder(), *([user_folder / "experiments"] if user_folder else [])):
+        for file in sorted(folder.glob("*/*.yaml")):
+            name = f"{file.parent.name}/{file.stem}"
+            if name in found:
+                raise ConfigError(f"{file}: experiments={name} exists already; rename yours")
+            found[name] = file
+    return found
 
 
 def title_of(name: str, file: Path) -> str:

@@ -180,3 +180,10 @@ def test_every_shipped_experiment_has_cells_and_paired_arms(name: str) -> None:
     assert len(labelled) > 1
     assert len({tuple(cell.labels.values()) for cell in labelled}) == len(labelled)
     assert all(set(cell.labels) == set(axes) for cell in labelled)
+
+
+def test_a_shipped_experiment_is_not_replaced_in_silence(tmp_path: Path) -> None:
+    (tmp_path / "experiments" / "mcr").mkdir(parents=True)
+    (tmp_path / "experiments" / "mcr" / "table1.yaml").write_text(TEXT)
+    with pytest.raises(ConfigError, match="experiments=mcr/table1 exists already"):
+        Composer(user_folder=tmp_path)
