@@ -10,7 +10,6 @@ pixel columns, before any voxel is looked at. Single rays are fused by `rays`.
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
 
 import numba as nb
 import numpy as np
@@ -21,6 +20,7 @@ from uavexp.mapping.frustum import column_depths, frustum_box
 from uavexp.mapping.occupancy import OccupancyMap, Rule, Voxels, observe, reciprocals
 from uavexp.mapping.parameters import MapParameters
 from uavexp.mapping.rays import integrate_rays
+from uavexp.parameters import option
 from uavexp.scene import Scene
 from uavexp.types import MapUpdate, RayScan, Scan
 
@@ -127,7 +127,7 @@ def integrate_scan(
     return count
 
 
-@dataclass(slots=True, kw_only=True)
+@option
 class Dense(MapParameters):
     """TSDF on a dense grid over the world's bounds; see `MapParameters`."""
 

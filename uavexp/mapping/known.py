@@ -14,16 +14,17 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from dataclasses import dataclass
 
 import numba as nb
 import numpy as np
 
 from uavexp.arrays import Bool, Float, Float32, Int, UInt8
-from uavexp.errors import require, require_positive
+from uavexp.errors import require
 from uavexp.field import FREE, OCCUPIED, DistanceField
-from uavexp.mapping.esdf import SignedDistance, distance_table
+from uavexp.mapping.esdf import SignedDistance
 from uavexp.mapping.occupancy import grid_shape
+from uavexp.mapping.parameters import FieldParameters
+from uavexp.parameters import NonNegative, option
 from uavexp.scene import Scene
 from uavexp.types import MapUpdate, Scan
 
@@ -102,33 +103,24 @@ def _halved(blocks: Bool, shape: tuple[int, ...], edge: int) -> Bool:
     return fine[tuple(slice(math.ceil(n / edge)) for n in shape)]
 
 
-@dataclass(slots=True, kw_only=True)
-class Known:
+@option
+class Known(FieldParameters):
     """The true fixed geometry as a voxel map, complete with the first update."""
 
-    voxel_size_m: float = 0.10
-    esdf_rate_hz: float = 10.0
-    max_distance_m: float = 2.0
-    occupied_below_m: float = 0.025
-    max_memory_mb: float = 1000.0
+    occupied_below_m: NonNegative = 0.025  # m; signed distance of a voxel's centre below which it is
+    # occupied, as of a measured map [ours]
     _scene: Scene | None = dataclasses.field(default=None, init=False, repr=False)
     _esdf: SignedDistance = dataclasses.field(init=False, repr=False)
     _field: DistanceField = dataclasses.field(init=False, repr=False)
     _made: UInt8 = dataclasses.field(init=False, repr=False)  # state as of the next update
 
     def __post_init__(self) -> None:
-        require_positive(
-            voxel_size_m=self.voxel_size_m,
-            esdf_rate_hz=self.esdf_rate_hz,
-            max_distance_m=self.max_distance_m,
-            max_memory_mb=self.max_memory_mb,
-        )
+        FieldParameters.__post_init__(self)
         require(
-            0.0 <= self.occupied_below_m < 0.5 * self.voxel_size_m,
-            "occupied_below_m must be >= 0 and below half of voxel_size_m = "
-            f"{self.voxel_size_m}, got {self.occupied_below_m}",
+            self.occupied_below_m < 0.5 * self.voxel_size_m,
+            f"occupied_below_m must be below half of voxel_size_m = {self.voxel_size_m}, "
+            f"got {self.occupied_below_m}",
         )
-        distance_table(self.voxel_size_m, self.max_distance_m)
 
     def reset(self, bounds_m: Float, scene: Scene) -> None:
         """Begin a trial in `scene` inside `bounds_m` (2, 3); unknown until a ball is marked free.

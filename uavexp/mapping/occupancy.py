@@ -35,7 +35,7 @@ import numba as nb
 import numpy as np
 
 from uavexp.arrays import Float, Float32, Int32, UInt8
-from uavexp.errors import WorldError, require
+from uavexp.errors import WorldError
 from uavexp.field import FREE, OCCUPIED, UNKNOWN, DistanceField
 from uavexp.mapping.esdf import SignedDistance
 from uavexp.types import MapUpdate
@@ -199,31 +199,6 @@ def grid_shape(
             f"allowed are {max_memory_mb:,.0f} MB (mapping.max_memory_mb)"
         )
     return int(count[0]), int(count[1]), int(count[2])
-
-
-def check_rule(rule: Rule) -> None:
-    """Raise `ConfigError` unless the rule is consistent."""
-    require(
-        -rule.truncation_m < rule.occupied_below_m < rule.free_above_m < rule.truncation_m,
-        "-truncation_m < occupied_below_m < free_above_m < truncation_m must hold, got "
-        f"truncation_m {rule.truncation_m}, occupied_below_m {rule.occupied_below_m}, "
-        f"free_above_m {rule.free_above_m}",
-    )
-    require(
-        0.0 < rule.solid_depth_m <= rule.truncation_m and rule.occupied_below_m > -rule.solid_depth_m,
-        "0 < solid_depth_m <= truncation_m and occupied_below_m > -solid_depth_m must hold, got "
-        f"solid_depth_m {rule.solid_depth_m}",
-    )
-    require(1 <= rule.max_weight <= 255, f"max_weight must be in 1..255, got {rule.max_weight}")
-    require(
-        1 <= rule.occupied_evidence <= rule.max_evidence <= LARGEST_EVIDENCE,
-        f"1 <= occupied_evidence <= max_evidence <= {LARGEST_EVIDENCE} must hold, got "
-        f"{rule.occupied_evidence} and {rule.max_evidence}",
-    )
-    require(
-        rule.hit_evidence >= 1 and rule.miss_evidence >= 1,
-        f"hit_evidence and miss_evidence must be >= 1, got {rule.hit_evidence} and {rule.miss_evidence}",
-    )
 
 
 class OccupancyMap:

@@ -3,53 +3,72 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 from uavexp.arrays import Float
-from uavexp.errors import require, require_positive
+from uavexp.errors import require
 from uavexp.mapping.esdf import distance_table
-from uavexp.mapping.occupancy import OccupancyMap, Rule, check_rule
+from uavexp.mapping.occupancy import LARGEST_EVIDENCE, OccupancyMap, Rule
+from uavexp.parameters import Count, Positive, between
 
 
 @dataclass(slots=True, kw_only=True)
-class MapParameters:
-    """Parameters shared by the backends; no state. Units in the names, meaning in `occupancy`."""
+class FieldParameters:
+    """Parameters that every backend has; no state."""
 
-    voxel_size_m: float = 0.10
-    truncation_m: float = 0.30
-    max_weight: int = 20
-    esdf_rate_hz: float = 10.0
-    max_distance_m: float = 2.0
-    occupied_below_m: float = 0.025
-    free_above_m: float = 0.10
-    solid_depth_m: float = 0.25
-    hit_evidence: int = 2
-    miss_evidence: int = 1
-    occupied_evidence: int = 4
-    max_evidence: int = 12
-    max_memory_mb: float = 1000.0
+    voxel_size_m: Positive = 0.10  # m; the paper's
+    esdf_rate_hz: Positive = 10.0  # Hz; the paper's
+    max_distance_m: Positive = 2.0  # m, truncation of the field; >= trigger.monitor_radius_m [ours]
+    max_memory_mb: Positive = 1000.0  # 10^6 bytes; larger maps are refused [ours]
 
     def __post_init__(self) -> None:
-        require_positive(
-            voxel_size_m=self.voxel_size_m,
-            truncation_m=self.truncation_m,
-            esdf_rate_hz=self.esdf_rate_hz,
-            max_distance_m=self.max_distance_m,
-            max_memory_mb=self.max_memory_mb,
+        distance_table(self.voxel_size_m, self.max_distance_m)  # refuses what it cannot hold
+
+
+@dataclass(slots=True, kw_only=True)
+class MapParameters(FieldParameters):
+    """Parameters of the backends that fuse scans; no state. Meaning in `occupancy`."""
+
+    truncation_m: Positive = 0.30  # m, of the signed distance along the optical axis
+    # [ours: the paper gives none]
+    max_weight: Annotated[int, between(1, 255)] = 20  # frames; a second at 20 Hz [ours: w_max is not given]
+    occupied_below_m: float = 0.025  # m; a judged distance below this is a hit [ours: a quarter of a voxel]
+    free_above_m: float = 0.10  # m; above this a miss; with occupied_below_m more than a voxel,
+    # so that sheets stay [ours]
+    solid_depth_m: Positive = 0.25  # m behind a surface that become occupied;
+    # half a voxel less than truncation_m [ours]
+    hit_evidence: Count = 2  # counts a hit adds; 2 to 1: an object hit in a third of the frames stands [ours]
+    miss_evidence: Count = 1  # counts a miss takes away [ours]
+    occupied_evidence: Count = 4  # counts that make a voxel occupied: two hits, so no speckle does [ours]
+    max_evidence: Annotated[int, between(1, LARGEST_EVIDENCE)] = 12  # counts at most (<= 31);
+    # what was removed is forgotten after 12 misses, 0.6 s [ours]
+
+    def __post_init__(self) -> None:
+        FieldParameters.__post_init__(self)
+        require(
+            -self.truncation_m < self.occupied_below_m < self.free_above_m < self.truncation_m,
+            "-truncation_m < occupied_below_m < free_above_m < truncation_m must hold, got "
+            f"truncation_m {self.truncation_m}, occupied_below_m {self.occupied_below_m}, "
+            f"free_above_m {self.free_above_m}",
         )
-        for name in ("max_weight", "hit_evidence", "miss_evidence", "occupied_evidence", "max_evidence"):
-            value = getattr(self, name)
-            require(isinstance(value, int), f"{name} must be a whole number, got {value}")
-        check_rule(self.rule())
-        distance_table(self.voxel_size_m, self.max_distance_m)
+        require(
+            self.solid_depth_m <= self.truncation_m and self.occupied_below_m > -self.solid_depth_m,
+            "solid_depth_m <= truncation_m and occupied_below_m > -solid_depth_m must hold, got "
+            f"solid_depth_m {self.solid_depth_m}",
+        )
+        require(
+            self.occupied_evidence <= self.max_evidence,
+            f"occupied_evidence must be <= max_evidence = {self.max_evidence}, got {self.occupied_evidence}",
+        )
 
     def rule(self) -> Rule:
         """Return the fusion and occupancy rule in the form that kernels take."""
         return Rule(
-            truncation_m=float(self.truncation_m),
+            truncation_m=self.truncation_m,
             max_weight=self.max_weight,
-            occupied_below_m=float(self.occupied_below_m),
-            free_above_m=float(self.free_above_m),
-            solid_depth_m=float(self.solid_depth_m),
+            occupied_below_m=self.occupied_below_m,
+            free_above_m=self.free_above_m,
+            solid_depth_m=self.solid_depth_m,
             hit_evidence=self.hit_evidence,
             miss_evidence=self.miss_evidence,
             occupied_evidence=self.occupied_evidence,

@@ -22,14 +22,13 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numba as nb
 import numpy as np
 
 from uavexp.arrays import Bool, Float, Float32, Int32
-from uavexp.errors import ConfigError, require
+from uavexp.errors import ConfigError
 from uavexp.field import DistanceField
 from uavexp.mapping.blocks import EDGE, Blocks, blocks_of, write_voxels
 from uavexp.mapping.frustum import column_depths, frustum_box
@@ -37,6 +36,7 @@ from uavexp.mapping.occupancy import OccupancyMap, Rule, Voxels, enlist, judge, 
 from uavexp.mapping.parameters import MapParameters
 from uavexp.mapping.rays import integrate_rays
 from uavexp.o3d import open3d
+from uavexp.parameters import Constraint, option
 from uavexp.scene import Scene
 from uavexp.types import DepthScan, MapUpdate, RayScan, Scan
 
@@ -183,22 +183,16 @@ def _take_over(
     return count
 
 
-@dataclass(slots=True, kw_only=True)
+@option
 class VoxelBlockGrid(MapParameters):
     """Open3D's voxel block grid over the world's bounds; see `MapParameters`."""
 
-    device: str = "CPU:0"
+    device: Annotated[str, Constraint("CPU:0 or CUDA:<number>", _DEVICE.fullmatch)] = "CPU:0"  # CPU:0 or
+    # CUDA:<number>; CUDA needs the package open3d in place of open3d-cpu
 
     _map: OccupancyMap | None = dataclasses.field(default=None, init=False, repr=False)
     _grid: Any = dataclasses.field(default=None, init=False, repr=False)
     _on: Any = dataclasses.field(default=None, init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        MapParameters.__post_init__(self)
-        require(
-            _DEVICE.fullmatch(str(self.device)) is not None,
-            f"device must be CPU:0 or CUDA:<number>, got {self.device}",
-        )
 
     def reset(self, bounds_m: Float, scene: Scene) -> None:
         """Begin a trial with everything unknown inside `bounds_m` (2, 3).

@@ -2,31 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from uavexp.arrays import Float
-from uavexp.errors import require, require_non_negative, require_positive
+from uavexp.errors import require
 from uavexp.explorer.base import Explorer
 from uavexp.log import Inspection
+from uavexp.parameters import NonNegative, Positive, option
 from uavexp.scene import Scene
 from uavexp.types import Limits, Observation, Outcome, State, World
 
 
-@dataclass(slots=True, kw_only=True)
+@option
 class Explore:
     """Explored = the explorer has had no goal for `patience_s`."""
 
-    patience_s: float = 2.0
-    time_base_s: float = 120.0
-    time_per_area_spm2: float = 1.0
+    patience_s: Positive = 2.0  # s, explored when no frontier was reachable for so long [ours]
+    time_base_s: Positive = 120.0  # s, time limit = this ... [ours]
+    time_per_area_spm2: NonNegative = 1.0  # s/m², ... plus this for each square metre of floor [ours]
     _time_limit_s: float = field(init=False, repr=False, default=0.0)
     _last_goal_s: float = field(init=False, repr=False, default=0.0)
-
-    def __post_init__(self) -> None:
-        require_positive(patience_s=self.patience_s, time_base_s=self.time_base_s)
-        require_non_negative(time_per_area_spm2=self.time_per_area_spm2)
 
     def requires(self, *, explorer: Explorer, **_: object) -> None:
         """Refuse an explorer that only flies to a target, of which there is none."""

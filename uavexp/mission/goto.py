@@ -2,30 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from uavexp.arrays import Float
-from uavexp.errors import require_non_negative, require_positive
 from uavexp.explorer.base import Explorer
 from uavexp.log import Inspection
+from uavexp.parameters import NonNegative, Positive, option
 from uavexp.scene import Scene
 from uavexp.types import Limits, Observation, Outcome, State, World
 
 
-@dataclass(slots=True, kw_only=True)
+@option
 class Goto:
     """Reached = within `tolerance_m` of the target, in truth."""
 
-    tolerance_m: float = 0.3
-    time_base_s: float = 60.0
-    time_per_path_spm: float = 5.0
+    tolerance_m: Positive = 0.3  # m, the target counts as reached within this distance, in truth [ours]
+    time_base_s: Positive = 60.0  # s, time limit = this ... [ours]
+    time_per_path_spm: NonNegative = 5.0  # s/m, ... plus this for each metre of the true shortest path [ours]
     _world: World | None = field(init=False, repr=False, default=None)
-
-    def __post_init__(self) -> None:
-        require_positive(tolerance_m=self.tolerance_m, time_base_s=self.time_base_s)
-        require_non_negative(time_per_path_spm=self.time_per_path_spm)
 
     def prepare(self, world: World, rng: np.random.Generator) -> World:
         """The world as it is."""

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from uavexp.arrays import Float
-from uavexp.errors import WorldError, require, require_non_negative, require_option, require_positive
+from uavexp.errors import WorldError, require
 from uavexp.explorer.base import Explorer
 from uavexp.geometry import yaw_of
 from uavexp.inspection.inspection_plan import (
@@ -29,6 +28,7 @@ from uavexp.log import Inspection
 from uavexp.mission import unforeseen
 from uavexp.mission.coverage import Coverage, reachable_m, visible_anywhere
 from uavexp.mission.tour_guide import Look, TourGuide
+from uavexp.parameters import Count, NonNegative, Positive, Range, Share, between, option
 from uavexp.scene import Scene
 from uavexp.types import Limits, Observation, Outcome, State, Surface, World
 
@@ -42,87 +42,60 @@ class Tour(StrEnum):
     NEAREST_NEIGHBOUR = "nearest_neighbour"
 
 
-@dataclass(slots=True, kw_only=True)
+@option
 class Inspect:
     """Inspected = every viewpoint was visited, or found to be blocked, out of reach or kept by movers.
 
     The reference map is the world's own, or its geometry before blocks were put into it. The
     plan is made on it once, before the flight; the flight knows the truth by its live map only.
-
-    Attributes:
-        blocks: boxes that stand in the truth and not in the reference.
-        block_width_m: least and greatest side of a block.
-        block_height_m: least and greatest height of a block.
-        shift_m: of the reference against the truth, level, in a drawn direction.
-        turn_deg: of the reference against the truth, about the vertical, in a drawn sense.
-        unknown_share: of the parts inside the building that the reference lacks.
-        gone_share: of the parts inside the building that the reference has and the truth lacks.
-        horizontal_fov_deg: of the inspecting camera, level along the vehicle's yaw.
-        vertical_fov_deg: of the same.
-        range_m: farthest distance at which a cell counts as seen.
-        incidence_deg: greatest angle of the line of sight to a cell's normal.
-        cell_m: edge of the cells of the surface.
-        cell_tolerance_m: between a cell and the true surface that is seen in its place.
-        stand_off_m: of viewpoints from the surface.
-        overlap: of neighbouring images, as a share.
-        least_new_m2: area that must be new for a view to be worth it.
-        clearance_m: of the vehicle's centre at viewpoints.
-        tour: how the viewpoints are ordered.
-        largest_outlier: tau_max; clusters smaller than it are merged; 1: none is.
-        max_lengthening: of the visit by merging, as a share.
-        view_adaptation: whether the yaw is chosen anew in flight (algorithm 2).
-        look: between viewpoints: ahead, or where the adapted yaw looks (needs a sensor all around).
-        occluded_weight: of a cell that a blocked viewpoint would have seen; others weigh 1.
-        arrive_m: distance from a viewpoint at which the vehicle has arrived.
-        yaw_tolerance_deg: from the planned yaw at which it has turned there.
-        dwell_s: longest stay at a viewpoint.
-        again_after_s: from putting a viewpoint off until it is tried again.
-        blocked_below_m: mapped distance below which a viewpoint is blocked.
-        rounds: of more viewpoints, by the live map, for what the plan's have left unseen.
-        rate_hz: of the choice of viewpoint and yaw.
-        keep_m: of the body from predicted movers at a viewpoint; while one comes nearer, others are
-            visited first, or the vehicle steps aside.
-        patience_s: longest wait for movers on the way to a viewpoint, in all, until it is put off.
-        time_base_s: time limit = this ...
-        time_per_viewpoint_s: ... plus this for each viewpoint ...
-        time_per_path_spm: ... plus this for each metre of the tour.
     """
 
-    blocks: int = 4
-    block_width_m: Sequence[float] = (0.3, 0.8)
-    block_height_m: Sequence[float] = (0.6, 2.0)
-    shift_m: float = 0.0
-    turn_deg: float = 0.0
-    unknown_share: float = 0.0
-    gone_share: float = 0.0
-    horizontal_fov_deg: float = 90.0
-    vertical_fov_deg: float = 73.7
-    range_m: float = 5.0
-    incidence_deg: float = 70.0
-    cell_m: float = 0.2
-    cell_tolerance_m: float = 0.15
-    stand_off_m: float = 1.8
-    overlap: float = 0.3
-    least_new_m2: float = 0.1
-    clearance_m: float = 0.45
-    tour: Tour = Tour.LIN_KERNIGHAN
-    largest_outlier: int = 3
-    max_lengthening: float = 0.05
-    view_adaptation: bool = True
-    look: Look = Look.AHEAD
-    occluded_weight: float = 5.0
-    arrive_m: float = 0.35
-    yaw_tolerance_deg: float = 4.0
-    dwell_s: float = 6.0
-    again_after_s: float = 3.0
-    blocked_below_m: float = 0.3
-    rounds: int = 1
-    rate_hz: float = 5.0
-    keep_m: float = 0.5
-    patience_s: float = 8.0
-    time_base_s: float = 120.0
-    time_per_viewpoint_s: float = 8.0
-    time_per_path_spm: float = 4.0
+    defaults_list: ClassVar[tuple[str, ...]] = ("override /world@_global_.world: facility", "_self_")  # In
+    # the facility unless another world is named: its inspection is short
+    blocks: Annotated[int, between(0, 100)] = 4  # boxes that stand in the truth and not in the
+    # reference [ours]
+    block_width_m: Range = (0.3, 0.8)  # m, least and greatest side of a block [ours]
+    block_height_m: Range = (0.6, 2.0)  # m, least and greatest height of a block [ours]
+    shift_m: NonNegative = 0.0  # m, of the reference against the truth, level, in a drawn direction [ours]
+    turn_deg: NonNegative = 0.0  # deg, of the reference against the truth, about the vertical,
+    # in a drawn sense [ours]
+    unknown_share: Share = 0.0  # of the parts inside the building that the reference lacks [ours]
+    gone_share: Share = 0.0  # of the parts inside the building that the reference has and the
+    # truth lacks [ours]
+    horizontal_fov_deg: Positive = 90.0  # deg, of the inspecting camera, level along the vehicle's yaw [ours]
+    vertical_fov_deg: Positive = 73.7  # deg, of the same [ours]
+    range_m: Positive = 5.0  # m, farthest distance at which a cell counts as seen [ours]
+    incidence_deg: Positive = 70.0  # deg, greatest angle of the line of sight to a cell's normal [ours]
+    cell_m: Positive = 0.2  # m, edge of the cells of the surface [ours]
+    cell_tolerance_m: Positive = 0.15  # m, between a cell and the true surface that is seen in
+    # its place [ours]
+    stand_off_m: Positive = 1.8  # m, of viewpoints from the surface [ours]
+    overlap: float = 0.3  # of neighbouring images, as a share [ours]
+    least_new_m2: float = 0.1  # m², area that must be new for a view to be worth it [ours]
+    clearance_m: Positive = 0.45  # m, of the vehicle's centre at viewpoints [ours]
+    tour: Tour = Tour.LIN_KERNIGHAN  # lin_kernighan | nearest_neighbour,
+    # how the viewpoints are ordered [ours]
+    largest_outlier: Count = 3  # tau_max; clusters smaller than it are merged; 1: none is [ours]
+    max_lengthening: float = 0.05  # of the visit by merging, as a share [ours]
+    view_adaptation: bool = True  # whether the yaw is chosen anew in flight (algorithm 2) [ours]
+    look: Look = Look.AHEAD  # ahead | adaptive, between viewpoints: ahead, or where the adapted yaw looks
+    # (needs a sensor all around) [ours]
+    occluded_weight: float = 5.0  # of a cell that a blocked viewpoint would have seen; others weigh 1 [ours]
+    arrive_m: Positive = 0.35  # m, distance from a viewpoint at which the vehicle has arrived [ours]
+    yaw_tolerance_deg: Positive = 4.0  # deg, from the planned yaw at which it has turned there [ours]
+    dwell_s: Positive = 6.0  # s, longest stay at a viewpoint [ours]
+    again_after_s: NonNegative = 3.0  # s, from putting a viewpoint off until it is tried again [ours]
+    blocked_below_m: NonNegative = 0.3  # m, mapped distance below which a viewpoint is blocked [ours]
+    rounds: Annotated[int, between(0, 100)] = 1  # of more viewpoints, by the live map,
+    # for what the plan's have left unseen [ours]
+    rate_hz: Positive = 5.0  # Hz, of the choice of viewpoint and yaw [ours]
+    keep_m: NonNegative = 0.5  # m, of the body from predicted movers at a viewpoint; else others come first,
+    # or it steps aside [ours]
+    patience_s: Positive = 8.0  # s, longest wait for movers on the way to a viewpoint, in all,
+    # until it is put off [ours]
+    time_base_s: Positive = 120.0  # s, time limit = this ... [ours]
+    time_per_viewpoint_s: NonNegative = 8.0  # s, ... plus this for each viewpoint ... [ours]
+    time_per_path_spm: NonNegative = 4.0  # s/m, ... plus this for each metre of the tour [ours]
     _guide: TourGuide | None = field(init=False, repr=False, default=None)
     _coverage: Coverage = field(init=False, repr=False)  # of the reference's surface
     _visible: Any = field(init=False, repr=False)  # (N,) cells that can be seen in truth
@@ -133,38 +106,6 @@ class Inspect:
     _next_look_s: float = field(init=False, repr=False, default=0.0)
 
     def __post_init__(self) -> None:
-        self.tour = require_option("tour", self.tour, Tour)
-        self.look = require_option("look", self.look, Look)
-        for name in ("blocks", "rounds"):
-            require(0 <= getattr(self, name) <= 100, f"{name} must be 0 to 100, got {getattr(self, name)}")
-        for name in ("block_width_m", "block_height_m"):
-            pair = [float(value) for value in getattr(self, name)]
-            require(
-                len(pair) == 2 and 0.0 < pair[0] <= pair[1] < math.inf,
-                f"{name} must be [least, greatest] > 0, got {pair}",
-            )
-        for name in ("unknown_share", "gone_share"):
-            require(0.0 <= getattr(self, name) <= 1.0, f"{name} must be 0 to 1, got {getattr(self, name)}")
-        require_positive(
-            cell_m=self.cell_m,
-            cell_tolerance_m=self.cell_tolerance_m,
-            clearance_m=self.clearance_m,
-            arrive_m=self.arrive_m,
-            yaw_tolerance_deg=self.yaw_tolerance_deg,
-            dwell_s=self.dwell_s,
-            rate_hz=self.rate_hz,
-            patience_s=self.patience_s,
-            time_base_s=self.time_base_s,
-        )
-        require_non_negative(
-            shift_m=self.shift_m,
-            turn_deg=self.turn_deg,
-            again_after_s=self.again_after_s,
-            blocked_below_m=self.blocked_below_m,
-            keep_m=self.keep_m,
-            time_per_viewpoint_s=self.time_per_viewpoint_s,
-            time_per_path_spm=self.time_per_path_spm,
-        )
         self._camera(), self._settings(), self._weights()  # each checks what it is made of
 
     def requires(self, *, stuck_s: float, **_: object) -> None:
@@ -228,7 +169,7 @@ class Inspect:
             plan=plan,
             camera=camera,
             settings=settings,
-            look=Look(self.look),
+            look=self.look,
             view_adaptation=self.view_adaptation,
             arrive_m=self.arrive_m,
             yaw_tolerance_rad=math.radians(self.yaw_tolerance_deg),

@@ -14,17 +14,17 @@ beam divergence, intensity, mixed returns at edges.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numba as nb
 import numpy as np
 
 from uavexp.arrays import Float, Float32
-from uavexp.errors import require, require_non_negative, require_positive
+from uavexp.errors import require
 from uavexp.geometry import rotation_from_quaternion
+from uavexp.parameters import NonNegative, Positive, Vector, at_least, below, between
 from uavexp.scene import Scene
-from uavexp.sensor.mount import require_mount
 from uavexp.types import RayScan, State
 
 
@@ -32,26 +32,22 @@ from uavexp.types import RayScan, State
 class LidarParameters:
     """Parameters that both LiDARs have; no state. The sensor's x points forward, z up."""
 
-    rate_hz: float = 10.0
-    min_range_m: float = 0.3
-    max_range_m: float = 12.0
-    range_noise_m: float = 0.02
-    missing_probability: float = 0.0
-    mount_offset_m: Sequence[float] = (0.0, 0.0, 0.0)
-    mount_pitch_deg: float = 0.0
+    rate_hz: Positive = 10.0  # Hz; scans, as both makers' drivers give them [ours]
+    min_range_m: NonNegative = 0.3  # m, nearer surfaces give no measurement [ours]
+    max_range_m: Positive = 12.0  # m, farther surfaces are measured as beyond range;
+    # the real ones see 100 m and more, a room ends sooner [ours]
+    range_noise_m: NonNegative = 0.02  # m, standard deviation; the data sheets' 2 cm
+    missing_probability: Annotated[float, at_least(0), below(1)] = 0.0  # of a ray without any
+    # measurement [ours]
+    mount_offset_m: Vector = (0.0, 0.0, 0.0)  # m, sensor in the body frame: forward, left, up [ours]
+    mount_pitch_deg: Annotated[float, between(-90, 90)] = 0.0  # deg, forward axis above (+) or below (-)
+    # body x [ours]
 
     def __post_init__(self) -> None:
-        require_positive(rate_hz=self.rate_hz, max_range_m=self.max_range_m)
-        require_non_negative(min_range_m=self.min_range_m, range_noise_m=self.range_noise_m)
         require(
             self.min_range_m < self.max_range_m,
             f"min_range_m must be < max_range_m = {self.max_range_m}, got {self.min_range_m}",
         )
-        require(
-            0.0 <= self.missing_probability < 1.0,
-            f"missing_probability must be >= 0 and < 1, got {self.missing_probability}",
-        )
-        require_mount(self.mount_offset_m, self.mount_pitch_deg)
 
     def pose(self, state: State) -> tuple[Float, Float]:
         """World position (3,) and sensor-to-world rotation (3, 3) of the sensor on a vehicle."""
@@ -59,7 +55,7 @@ class LidarParameters:
         pitch = math.radians(self.mount_pitch_deg)
         c, s = math.cos(pitch), math.sin(pitch)
         mount = np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]])
-        return state.position_m + body @ np.array([float(x) for x in self.mount_offset_m]), body @ mount
+        return state.position_m + body @ np.array(self.mount_offset_m), body @ mount
 
 
 @nb.njit(cache=True)
@@ -117,8 +113,7 @@ def take_scan(
     count = direction.shape[0]
     range_m = _measure(
         true_m, rng.standard_normal(count, dtype=np.float32), rng.random(count, dtype=np.float32),
-        float(lidar.range_noise_m), float(lidar.missing_probability),
-        float(lidar.min_range_m), float(lidar.max_range_m),
+        lidar.range_noise_m, lidar.missing_probability, lidar.min_range_m, lidar.max_range_m,
     )  # fmt: skip
     origin_m, rotation = lidar.pose(believed_state)
     if believed_state is not true_state:

@@ -2,35 +2,33 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
+from typing import Annotated
 
 import numpy as np
 
 from uavexp.arrays import Float32
 from uavexp.errors import require
+from uavexp.parameters import between, option
 from uavexp.scene import Scene
 from uavexp.sensor.lidar import LidarParameters, take_scan
 from uavexp.types import RayScan, State
 
 
-@dataclass(slots=True, kw_only=True)
+@option
 class LidarSpinning(LidarParameters):
     """A full turn a scan; rings evenly spaced over the vertical field, its ends included."""
 
-    rings: int = 16
-    azimuths: int = 360
-    lowest_deg: float = -20.0
-    highest_deg: float = 10.0
+    rings: Annotated[int, between(2, 256)] = 16  # elevations; a common size [ours]
+    azimuths: Annotated[int, between(2, 8192)] = 360  # rays a turn in each ring, one a degree [ours]
+    lowest_deg: float = -20.0  # deg, elevation of the lowest ring [ours: a ring is level, at flight height]
+    highest_deg: float = 10.0  # deg, elevation of the highest ring [ours]
     _scene: Scene = field(init=False, repr=False)
     _rng: np.random.Generator = field(init=False, repr=False)
     _direction: Float32 = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Check every parameter."""
         LidarParameters.__post_init__(self)
-        for name, count, most in (("rings", self.rings, 256), ("azimuths", self.azimuths, 8192)):
-            whole = isinstance(count, int) and not isinstance(count, bool)
-            require(whole and 2 <= count <= most, f"{name} must be a whole number, 2 to {most}, got {count}")
         require(
             -90.0 < self.lowest_deg < self.highest_deg < 90.0,
             "-90 < lowest_deg < highest_deg < 90 must hold, got "

@@ -22,17 +22,17 @@ Left out: lateral noise, lens distortion, interference, motion blur, colour.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
+from typing import Annotated
 
 import numba as nb
 import numpy as np
 
 from uavexp.arrays import Float, Float32
-from uavexp.errors import require, require_non_negative, require_positive
+from uavexp.errors import require
 from uavexp.geometry import rotation_from_quaternion
+from uavexp.parameters import NonNegative, Positive, Share, Vector, above, at_most, between, option
 from uavexp.scene import Scene
-from uavexp.sensor.mount import require_mount
 from uavexp.types import DepthScan, State
 
 
@@ -122,28 +122,34 @@ def _at_edge(inverse: Float32, v: int, u: int, ratio: float, least: float) -> bo
     return False
 
 
-@dataclass(slots=True, kw_only=True)
+Pixels = Annotated[int, between(2, 4096)]
+
+
+@option
 class Rgbd:
     """RGB-D depth camera with switchable noise terms."""
 
-    rate_hz: float = 20.0
-    width_px: int = 96
-    height_px: int = 72
-    horizontal_fov_deg: float = 90.0
-    min_range_m: float = 0.2
-    max_range_m: float = 5.0
-    mount_offset_m: Sequence[float] = (0.0, 0.0, 0.0)
-    mount_pitch_deg: float = 0.0
-    axial_noise: bool = True
-    quantisation: bool = True
-    baseline_m: float = 0.075
-    disparity_focal_px: float = 580.0
-    disparity_step_px: float = 0.125
-    edge_missing: bool = True
-    edge_ratio: float = 0.1
-    edge_missing_probability: float = 0.5
-    grazing_missing: bool = True
-    grazing_angle_deg: float = 80.0
+    rate_hz: Positive = 20.0  # Hz; paper 1
+    width_px: Pixels = 96  # px; a pixel at 5 m is about a voxel wide [ours]
+    height_px: Pixels = 72  # px [ours]
+    horizontal_fov_deg: Annotated[float, between(1, 170)] = 90.0  # deg; paper 1 (axis [ours])
+    min_range_m: NonNegative = 0.2  # m, nearer surfaces give no measurement [ours]
+    max_range_m: Positive = 5.0  # m, farther surfaces are measured as beyond range [ours]
+    mount_offset_m: Vector = (0.0, 0.0, 0.0)  # m, camera in the body frame: forward, left, up [ours]
+    mount_pitch_deg: Annotated[float, between(-90, 90)] = 0.0  # deg, optical axis above (+) or below
+    # (-) body x [ours]
+    axial_noise: bool = True  # sigma(z) = 0.0012 + 0.0019 (z - 0.4)^2 m; Nguyen et al. 2012
+    quantisation: bool = True  # disparity rounded to steps; Khoshelham and Elberink 2012
+    baseline_m: Positive = 0.075  # m, projector to infrared camera; Khoshelham and Elberink 2012
+    disparity_focal_px: Positive = 580.0  # px, focal length of the infrared camera;
+    # Khoshelham and Elberink 2012
+    disparity_step_px: Positive = 0.125  # px; 0.07 m of depth at 5 m; Khoshelham and Elberink 2012
+    edge_missing: bool = True  # missing returns at depth edges; paper 1's "realistic depth noise"
+    edge_ratio: Positive = 0.1  # jump of inverse depth that is an edge, as a share of the larger one [ours]
+    edge_missing_probability: Share = 0.5  # of a missing return at an edge pixel [ours]
+    grazing_missing: bool = True  # missing returns at grazing angles
+    grazing_angle_deg: Annotated[float, above(0), at_most(90)] = 80.0  # deg between ray and surface normal
+    # beyond which nothing returns [ours]
     _scene: Scene = field(init=False, repr=False)
     _rng: np.random.Generator = field(init=False, repr=False)
     _directions: Float32 = field(init=False, repr=False)
@@ -152,35 +158,9 @@ class Rgbd:
     _body_from_camera: Float = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Check every parameter."""
-        require_positive(
-            rate_hz=self.rate_hz,
-            max_range_m=self.max_range_m,
-            baseline_m=self.baseline_m,
-            disparity_focal_px=self.disparity_focal_px,
-            disparity_step_px=self.disparity_step_px,
-            edge_ratio=self.edge_ratio,
-        )
-        require_non_negative(min_range_m=self.min_range_m)
-        for name, size in (("width_px", self.width_px), ("height_px", self.height_px)):
-            whole = isinstance(size, int) and not isinstance(size, bool)
-            require(whole and 2 <= size <= 4096, f"{name} must be a whole number, 2 to 4096, got {size}")
-        require(
-            1.0 <= self.horizontal_fov_deg <= 170.0,
-            f"horizontal_fov_deg must be 1 to 170 deg, got {self.horizontal_fov_deg}",
-        )
         require(
             self.min_range_m < self.max_range_m,
             f"min_range_m must be < max_range_m = {self.max_range_m}, got {self.min_range_m}",
-        )
-        require_mount(self.mount_offset_m, self.mount_pitch_deg)
-        require(
-            0.0 <= self.edge_missing_probability <= 1.0,
-            f"edge_missing_probability must be 0 to 1, got {self.edge_missing_probability}",
-        )
-        require(
-            0.0 < self.grazing_angle_deg <= 90.0,
-            f"grazing_angle_deg must be > 0 and <= 90 deg, got {self.grazing_angle_deg}",
         )
 
     @property
@@ -202,7 +182,7 @@ class Rgbd:
         grid = np.stack([(u - cx) / self.focal_px, (v - cy) / self.focal_px, np.ones_like(u)], axis=-1)
         self._directions = grid.reshape(-1, 3).astype(np.float32)
         self._rays = np.empty((self._directions.shape[0], 6), dtype=np.float32)
-        self._offset_m = np.array([float(x) for x in self.mount_offset_m])
+        self._offset_m = np.array(self.mount_offset_m)
         pitch = math.radians(self.mount_pitch_deg)
         forward = np.array([math.cos(pitch), 0.0, math.sin(pitch)])
         down = np.array([math.sin(pitch), 0.0, -math.cos(pitch)])
@@ -222,12 +202,12 @@ class Rgbd:
             self._rays,
             self._rng.standard_normal(shape, dtype=np.float32),
             self._rng.random(shape, dtype=np.float32),
-            float(self.min_range_m),
-            float(self.max_range_m),
+            self.min_range_m,
+            self.max_range_m,
             1.0 if self.axial_noise else 0.0,
             unit if self.quantisation else 0.0,
-            float(self.edge_ratio),
-            float(self.edge_missing_probability) if self.edge_missing else 0.0,
+            self.edge_ratio,
+            self.edge_missing_probability if self.edge_missing else 0.0,
             math.cos(math.radians(self.grazing_angle_deg)) if self.grazing_missing else 0.0,
         )
         return DepthScan(

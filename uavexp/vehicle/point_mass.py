@@ -19,7 +19,8 @@ import numpy as np
 from uavexp.arrays import Float
 from uavexp.geometry import GRAVITY_MPS2
 from uavexp.parameters import Positive, option
-from uavexp.types import Command, Limits, State
+from uavexp.types import Command, State
+from uavexp.vehicle.body import Body
 
 
 @nb.njit(cache=True)
@@ -64,28 +65,12 @@ def _turned(q: Float, axis: Float, angle_rad: float) -> Float:
 
 
 @option
-class PointMass:
+class PointMass(Body):
     """Point mass with ideal thrust and a rate-limited attitude."""
 
-    mass_kg: Positive = 0.75  # kg; paper 4
-    length_m: Positive = 0.32  # m, body box along x; paper 1
-    width_m: Positive = 0.32  # m, body box along y; paper 1
-    height_m: Positive = 0.12  # m, body box along z; paper 1
-    max_speed_mps: Positive = 2.5  # m/s; paper 1
-    max_acceleration_mps2: Positive = 2.5  # m/s^2 [ours]
     max_body_rate_radps: Positive = 2.0  # rad/s, how fast the attitude turns at most; paper 1
     _x: Float = field(init=False, repr=False)
     _command: Float = field(init=False, repr=False)
-
-    @property
-    def limits(self) -> Limits:
-        """What may be asked of it."""
-        return Limits(
-            max_speed_mps=self.max_speed_mps,
-            max_acceleration_mps2=self.max_acceleration_mps2,
-            max_body_rate_radps=self.max_body_rate_radps,
-            body_size_m=(self.length_m, self.width_m, self.height_m),
-        )
 
     def reset(self, state: State) -> None:
         """Begin a trial in `state`."""

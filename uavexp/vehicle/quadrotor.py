@@ -32,7 +32,8 @@ from uavexp.arrays import Float
 from uavexp.errors import require
 from uavexp.geometry import GRAVITY_MPS2
 from uavexp.parameters import NonNegative, Positive, between, option
-from uavexp.types import Command, Limits, State
+from uavexp.types import Command, State
+from uavexp.vehicle.body import Body
 
 # layout of the state vector of the kernels
 _P, _V, _Q, _W, _ROTOR, _SIZE = 0, 3, 6, 10, 13, 17
@@ -200,10 +201,9 @@ def _advance(
 
 
 @option
-class Quadrotor:
+class Quadrotor(Body):
     """Rigid-body quadrotor with rotor lag, drag and a rate-limited attitude loop."""
 
-    mass_kg: Positive = 0.75  # kg; paper 4
     inertia_x_kgm2: Positive = 0.015  # kg m^2, about body x (roll); paper 4
     inertia_y_kgm2: Positive = 0.015  # kg m^2, about body y (pitch); paper 4
     inertia_z_kgm2: Positive = 0.024  # kg m^2, about body z (yaw); paper 4
@@ -227,12 +227,6 @@ class Quadrotor:
     rate_margin: Annotated[float, between(0, 0.5)] = 0.05  # share of the body rate limit left to the rate
     # loop's overshoot (measured 0.033) [ours]
     substeps: Annotated[int, between(1, 100)] = 2  # RK4 and attitude loop steps per simulation step [ours]
-    length_m: Positive = 0.32  # m, body box along x; paper 1
-    width_m: Positive = 0.32  # m, body box along y; paper 1
-    height_m: Positive = 0.12  # m, body box along z; paper 1
-    max_speed_mps: Positive = 2.5  # m/s; paper 1
-    max_acceleration_mps2: Positive = 2.5  # m/s^2 [ours]
-    max_body_rate_radps: Positive = 2.0  # rad/s, of each axis; paper 1 (axes [ours])
     _plant: Plant = field(init=False, repr=False)
     _loop: AttitudeLoop = field(init=False, repr=False)
     _x: Float = field(init=False, repr=False)
@@ -266,16 +260,6 @@ class Quadrotor:
             tilt_rate_gain_per_s=self.tilt_rate_gain_per_s,
             yaw_rate_gain_per_s=self.yaw_rate_gain_per_s,
             max_body_rate_radps=(1.0 - self.rate_margin) * self.max_body_rate_radps,
-        )
-
-    @property
-    def limits(self) -> Limits:
-        """What may be asked of it."""
-        return Limits(
-            max_speed_mps=self.max_speed_mps,
-            max_acceleration_mps2=self.max_acceleration_mps2,
-            max_body_rate_radps=self.max_body_rate_radps,
-            body_size_m=(self.length_m, self.width_m, self.height_m),
         )
 
     @property

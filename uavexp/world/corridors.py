@@ -2,51 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from uavexp.arrays import Bool, Float
-from uavexp.errors import require, require_non_negative, require_positive
-from uavexp.types import World
+from uavexp.errors import require
+from uavexp.parameters import Positive, Share, between, option
 from uavexp.world import indoor
 from uavexp.world.boxes import Boxes
 
 DOORWAY_M = 0.2  # thickness of a doorway's frame along the passage
 
 
-@dataclass(slots=True, kw_only=True)
-class Corridors:
-    """Corridors on a grid of crossings: a random tree joins all, and some loops are added.
+@option
+class Corridors(indoor.Indoor):
+    """Corridors on a grid of crossings: a random tree joins all, and some loops are added."""
 
-    Attributes:
-        size_m: inner size of the floor [x, y, z], m.
-        corridor_m: width of a corridor, m.
-        block_m: length of the solid blocks between two corridors, about, m.
-        loop_share: share of the passages outside the tree that are open too, 0 to 1.
-        doorway_share: share of open passages with a doorway (two jambs and a lintel), 0 to 1.
-        doorway_width_m: free width of a doorway, m.
-        doorway_height_m: free height of a doorway, m.
-        clutter_per_passage: cabinets, boxes and hanging signs per open passage, on average.
-        flight_height_m: z of start and target, m.
-        clearance_m: guaranteed distance of the body's centre from everything, m.
-    """
+    advice = "lower clutter_per_passage, or raise corridor_m or doorway_width_m"
 
-    size_m: Sequence[float] = (22.0, 14.0, 2.8)
-    corridor_m: float = 2.0
-    block_m: float = 2.6
-    loop_share: float = 0.35
-    doorway_share: float = 0.25
-    doorway_width_m: float = 1.3
-    doorway_height_m: float = 2.1
-    clutter_per_passage: float = 0.6
-    flight_height_m: float = 1.2
-    clearance_m: float = 0.45
+    size_m: indoor.Size = (22.0, 14.0, 2.8)  # m, inner length, width, height
+    corridor_m: Positive = 2.0  # m, width of a corridor [ours]
+    block_m: Positive = 2.6  # m, length of the solid blocks between corridors, about [ours]
+    loop_share: Share = 0.35  # 0 to 1, share of passages open beyond those that join all crossings [ours]
+    doorway_share: Share = 0.25  # 0 to 1, share of open passages with a doorway [ours]
+    doorway_width_m: Positive = 1.3  # m, free width of a doorway [ours]
+    doorway_height_m: Positive = 2.1  # m, free height under its lintel [ours]
+    clutter_per_passage: Annotated[float, between(0, 20)] = 0.6  # cabinets, boxes and hanging signs per open
+    # passage, mean [ours]
 
     def __post_init__(self) -> None:
-        self.size_m = indoor.checked_size(self.size_m, self.flight_height_m, self.clearance_m)
-        require_positive(corridor_m=self.corridor_m, block_m=self.block_m)
+        indoor.Indoor.__post_init__(self)
         require(
             self.corridor_m >= 2.0 * self.clearance_m,
             f"corridor_m must be at least twice clearance_m, {2.0 * self.clearance_m:g} m, "
@@ -57,28 +43,9 @@ class Corridors:
             f"size_m must hold two corridors and a block, {2.0 * self.corridor_m + 0.5:g} m, "
             f"got {list(self.size_m)}",
         )
-        require(0.0 <= self.loop_share <= 1.0, f"loop_share must be 0 to 1, got {self.loop_share}")
-        require(0.0 <= self.doorway_share <= 1.0, f"doorway_share must be 0 to 1, got {self.doorway_share}")
-        require_positive(doorway_width_m=self.doorway_width_m, doorway_height_m=self.doorway_height_m)
-        require_non_negative(clutter_per_passage=self.clutter_per_passage)
-        require(
-            self.clutter_per_passage <= 20.0,
-            f"clutter_per_passage must be <= 20, got {self.clutter_per_passage}",
-        )
 
-    def generate(self, rng: np.random.Generator) -> World:
-        """Return the world; raise `WorldError` when no drawing joins start and target."""
-        return indoor.draw(
-            name="corridors",
-            furnish=self._furnish,
-            size_m=tuple(self.size_m),
-            flight_height_m=self.flight_height_m,
-            clearance_m=self.clearance_m,
-            advice="lower clutter_per_passage, or raise corridor_m or doorway_width_m",
-            rng=rng,
-        )
-
-    def _furnish(self, boxes: Boxes, rng: np.random.Generator) -> None:
+    def furnish(self, boxes: Boxes, rng: np.random.Generator) -> None:
+        """Blocks between the corridors; closed passages, and open ones with doorways and clutter."""
         height = self.size_m[2]
         x, y = self._edges(self.size_m[0], rng), self._edges(self.size_m[1], rng)
         along_x, along_y = _passages(len(x) // 2, len(y) // 2, self.loop_share, rng)

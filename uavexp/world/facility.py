@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 
-from uavexp.errors import require, require_non_negative, require_option
-from uavexp.types import World
+from uavexp.errors import require
+from uavexp.parameters import Whole, option
 from uavexp.world import indoor
 from uavexp.world.boxes import Boxes
 
@@ -27,45 +25,24 @@ class Layout(StrEnum):
     RING = "ring"  # a corridor around a closed core, with two rooms beside it
 
 
-@dataclass(slots=True, kw_only=True)
-class Facility:
-    """A plan of straight walls, shifted a little by the seed, with machines on the floor.
+@option
+class Facility(indoor.Indoor):
+    """A plan of straight walls, shifted a little by the seed, with machines on the floor."""
 
-    Attributes:
-        layout: which of the two floors.
-        size_m: inner size of the floor [x, y, z], m.
-        machines: pieces that stand on the floor; those that find no place are left out.
-        flight_height_m: z of start and target, m.
-        clearance_m: guaranteed distance of the body's centre from everything, m.
-    """
+    layout: Layout = Layout.BAYS  # bays | ring, the two floors after paper 3, figure 3
+    advice = "fewer machines, or a larger size_m"
 
-    layout: Layout = Layout.BAYS
-    size_m: Sequence[float] = (18.0, 11.0, 2.8)
-    machines: int = 4
-    flight_height_m: float = 1.2
-    clearance_m: float = 0.45
+    size_m: indoor.Size = (18.0, 11.0, 2.8)  # m, inner length, width, height [ours]
+    machines: Whole = 4  # pieces on the floor, away from the walls [ours]
 
     def __post_init__(self) -> None:
-        self.layout = require_option("layout", self.layout, Layout)
-        self.size_m = indoor.checked_size(self.size_m, self.flight_height_m, self.clearance_m)
+        indoor.Indoor.__post_init__(self)
         require(
             min(self.size_m[:2]) >= 9.0, f"size_m must be at least 9 m long and wide, got {list(self.size_m)}"
         )
-        require_non_negative(machines=self.machines)
 
-    def generate(self, rng: np.random.Generator) -> World:
-        """Return the world; raise `WorldError` when no drawing joins start and target."""
-        return indoor.draw(
-            name="facility",
-            furnish=self._furnish,
-            size_m=tuple(self.size_m),
-            flight_height_m=self.flight_height_m,
-            clearance_m=self.clearance_m,
-            advice="fewer machines, or a larger size_m",
-            rng=rng,
-        )
-
-    def _furnish(self, boxes: Boxes, rng: np.random.Generator) -> None:
+    def furnish(self, boxes: Boxes, rng: np.random.Generator) -> None:
+        """The walls of the layout, and machines where there is room."""
         walls = (self._bays if self.layout is Layout.BAYS else self._ring)(rng)
         for low, high in walls:
             boxes.span((*low, 0.0), (*high, self.size_m[2]))

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Literal
 
 import numpy as np
 
 from uavexp.arrays import Bool, Float, Float32, Int32
-from uavexp.errors import WorldError, require, require_non_negative, require_positive
+from uavexp.errors import WorldError, require
+from uavexp.parameters import Constraint, Finite, NonNegative, Positive, Vector, option
 from uavexp.scene import Scene
 from uavexp.types import World
 from uavexp.world import readers, ros_map, task
@@ -25,7 +26,6 @@ UP_AXES = {
     "-y": ((1, 0, 0), (0, 0, 1), (0, -1, 0)),
     "-z": ((1, 0, 0), (0, -1, 0), (0, 0, -1)),
 }
-UNKNOWN = ("wall", "free")
 INSET_M = (0.3, 0.3, 0.4)  # of the flight bounds from the geometry's bounding box, when not given
 MAP_MARGIN_M = 0.6  # of the mapped box around the flight bounds: walls just outside are mapped
 MAP_VOXEL_M = 0.1
@@ -34,70 +34,42 @@ FARTHEST_M = 20_000.0  # beyond it float32 cannot place a surface to a millimetr
 SAMPLE_ATTEMPTS = 100
 
 
-@dataclass(slots=True, kw_only=True)
+Box = Annotated[
+    tuple[Vector, Vector],
+    Constraint(
+        "[[lower x, y, z], [upper x, y, z]]",
+        lambda box: all(low < high for low, high in zip(*box, strict=True)),
+    ),
+]
+
+
+@option
 class File:
-    """A world read from a file; lengths below are in m in the converted frame, z up.
+    """A world read from a file; lengths below are in m in the converted frame, z up."""
 
-    Attributes:
-        path: mesh (ply, obj, stl, glb), point cloud (pcd, ply without faces), occupied voxels
-            (npz) or ROS map (yaml); relative to the working directory.
-        unit_m: length of one unit of the file, m.
-        up_axis: which of the file's axes points up: x, y, z, -x, -y or -z.
-        start_m: start [x, y, z]; null: drawn, as the target is, from one connected free part.
-        target_m: target [x, y, z]; null exactly when start_m is.
-        flight_bounds_m: [[x, y, z], [x, y, z]], box the body's centre may not leave; null: the
-            bounding box of the geometry less 0.3 m at the sides and 0.4 m below and above.
-        clearance_m: that the body's centre needs all along a path for it to count, m.
-        flight_height_m: z of a drawn start and target, m.
-        least_distance_m: between a drawn start and target, m.
-        voxel_size_m: of the voxels that a point cloud is turned into, m.
-        wall_height_m: to which a ROS map is extruded from its floor at z = 0, m.
-        unknown: what unknown cells of a ROS map or of voxels with measured free ones are: wall, free.
-        max_map_gib: memory that the map of the flight bounds may need at 0.1 m, GiB.
-    """
-
-    path: str
-    unit_m: float = 1.0
-    up_axis: str = "z"
-    start_m: Sequence[float] | None = None
-    target_m: Sequence[float] | None = None
-    flight_bounds_m: Sequence[Sequence[float]] | None = None
-    clearance_m: float = 0.35
-    flight_height_m: float = 1.2
-    least_distance_m: float = 8.0
-    voxel_size_m: float = 0.1
-    wall_height_m: float = 2.5
-    unknown: str = "wall"
-    max_map_gib: float = 2.0
+    path: Annotated[str, Constraint("the name of a world file", bool)]  # mesh ply obj stl glb, cloud pcd ply,
+    # voxels npz, ROS map yaml; relative to the working directory
+    unit_m: Positive = 1.0  # m, length of one unit of the file (0.001 for mm, 0.0254 for inches)
+    up_axis: Literal["x", "y", "z", "-x", "-y", "-z"] = "z"  # the file's axis that points up:
+    # x y z -x -y -z (glb: y)
+    start_m: Vector | None = None  # m, [x, y, z]; null: drawn by the seed from one connected free part
+    target_m: Vector | None = None  # m, [x, y, z]; null exactly when start_m is
+    flight_bounds_m: Box | None = None  # m, [[x, y, z], [x, y, z]] for the body's centre; null:
+    # bounding box less 0.3 and 0.4 m
+    clearance_m: Positive = 0.35  # m, needed by the body's centre all along a path for it to count [ours]
+    flight_height_m: Finite = 1.2  # m, z of a drawn start and target [ours]
+    least_distance_m: NonNegative = 8.0  # m, between a drawn start and target [ours]
+    voxel_size_m: Positive = 0.1  # m, voxels that a point cloud is turned into [ours]
+    wall_height_m: Positive = 2.5  # m, to which a ROS map is extruded from its floor at z = 0 [ours]
+    unknown: Literal["wall", "free"] = "wall"  # wall or free: unknown cells of a ROS map,
+    # or of voxels with measured free ones [ours]
+    max_map_gib: Positive = 2.0  # GiB, memory that the map of the flight bounds may need at 0.1 m [ours]
 
     def __post_init__(self) -> None:
-        require(bool(self.path), "path must name a world file, got an empty text")
-        require_positive(
-            unit_m=self.unit_m,
-            clearance_m=self.clearance_m,
-            voxel_size_m=self.voxel_size_m,
-            wall_height_m=self.wall_height_m,
-            max_map_gib=self.max_map_gib,
-        )
-        require_non_negative(least_distance_m=self.least_distance_m)
-        height = self.flight_height_m
-        require(math.isfinite(height), f"flight_height_m must be finite, got {height}")
-        require(self.up_axis in UP_AXES, f"up_axis must be one of {' '.join(UP_AXES)}, got {self.up_axis!r}")
-        require(self.unknown in UNKNOWN, f"unknown must be wall or free, got {self.unknown!r}")
         require(
             (self.start_m is None) == (self.target_m is None),
             "start_m and target_m must be given both or not at all",
         )
-        if self.start_m is not None and self.target_m is not None:
-            _numbers("start_m", self.start_m, (3,))
-            _numbers("target_m", self.target_m, (3,))
-        if self.flight_bounds_m is not None:
-            low, high = _numbers("flight_bounds_m", self.flight_bounds_m, (2, 3))
-            require(
-                bool((low < high).all()),
-                f"flight_bounds_m must be [[lower x, y, z], [upper x, y, z]], got {low.tolist()} and "
-                f"{high.tolist()}",
-            )
 
     def generate(self, rng: np.random.Generator) -> World:
         """Return the world; raise `WorldError` in one line when file or task is unusable."""
@@ -168,7 +140,7 @@ class File:
     def _meshed(self, occupied: Float, free: Float | None, size_m: float) -> tuple[Float32, Int32]:
         """Surface of voxels given by their centres; only the mapped box counts when bounds are given."""
         if self.flight_bounds_m is not None:
-            low, high = _numbers("flight_bounds_m", self.flight_bounds_m, (2, 3))
+            low, high = np.array(self.flight_bounds_m)
             near = ((occupied > low - MAP_MARGIN_M) & (occupied < high + MAP_MARGIN_M)).all(axis=1)
             if not near.any():
                 raise WorldError(f"{self.path}: nothing lies within flight_bounds_m; is unit_m right?")
@@ -209,7 +181,7 @@ class File:
                     f"is unit_m={self.unit_m:g} right?"
                 )
             return bounds
-        bounds = _numbers("flight_bounds_m", self.flight_bounds_m, (2, 3))
+        bounds = np.array(self.flight_bounds_m)
         if (bounds[0] > box[1]).any() or (bounds[1] < box[0]).any():
             raise WorldError(
                 f"{self.path}: the geometry reaches from {_text(box[0])} to {_text(box[1])} m, apart from "
@@ -228,7 +200,7 @@ class File:
             )
 
     def _checked_end(self, name: str, given: Sequence[float], scene: Scene, flight_bounds_m: Float) -> Float:
-        point = _numbers(name, given, (3,))
+        point = np.array(given)
         if (point < flight_bounds_m[0]).any() or (point > flight_bounds_m[1]).any():
             raise WorldError(
                 f"{self.path}: {name} {_text(point)} lies outside the flight bounds "
@@ -269,21 +241,6 @@ class File:
             f"{self.path}: no two points at flight_height_m={height:g} in the largest free part, "
             f"{extent:.1f} m across, are least_distance_m={self.least_distance_m:g} apart"
         )
-
-
-def _numbers(name: str, values: Sequence[object], shape: tuple[int, ...]) -> Float:
-    """Return finite numbers of a shape, or raise `ConfigError`."""
-    try:
-        rows = [list(row) if len(shape) == 2 else row for row in values]  # type: ignore[call-overload]
-        array = np.array(rows, dtype=np.float64)
-    except (TypeError, ValueError):
-        array = np.empty(0)
-    wanted = "[x, y, z]" if shape == (3,) else "[[x, y, z], [x, y, z]]"
-    require(
-        array.shape == shape and bool(np.isfinite(array).all()),
-        f"{name} must be {wanted} of finite numbers, got {values}",
-    )
-    return array
 
 
 def _text(values: Float) -> str:

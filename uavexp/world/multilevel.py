@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
 
 from uavexp.arrays import Float
-from uavexp.errors import WorldError, require, require_positive
+from uavexp.errors import require
+from uavexp.parameters import FINITE, Count, Positive, Share, Whole, at_least, option
 from uavexp.scene import Scene
-from uavexp.types import World
-from uavexp.world import indoor, task
-from uavexp.world.boxes import WALL_M, Boxes
+from uavexp.world import indoor
+from uavexp.world.boxes import Boxes
 
 DECK_M = 0.06  # thickness of a deck
 POST_M = 0.09  # uprights, square
@@ -26,54 +25,35 @@ DUCT_M = 0.3  # side of the duct under each ceiling
 TASK_ATTEMPTS = 40  # drawings of start and target in one geometry
 
 
-@dataclass(slots=True, kw_only=True)
-class Multilevel:
+@option
+class Multilevel(indoor.Indoor):
     """Racks along x on every storey; between storeys only the hatches in the decks are open.
 
     Start and target lie on the lowest and the highest storey, in opposite corners, as in a
     delivery to an upper level. Every storey draws its own racks, goods and hatches.
-
-    Attributes:
-        size_m: inner size of the hall [x, y, z], m (12.78 x 6.06 x 8.46 in Liao et al.).
-        storeys: number of storeys, at least 2.
-        racks: rows of racks on each storey.
-        rack_depth_m: depth of a row, m.
-        shelf_pitch_m: height from one shelf to the next, m.
-        load_share: share of shelf places that hold goods, 0 to 1.
-        hatches: openings in each deck, drawn over its aisles.
-        hatch_m: length of a hatch along the aisle, m.
-        flight_height_m: of start and target above their storey's deck, m.
-        clearance_m: guaranteed distance of the body's centre from everything, m.
     """
 
-    size_m: Sequence[float] = (12.78, 6.06, 8.46)
-    storeys: int = 4
-    racks: int = 2
-    rack_depth_m: float = 0.8
-    shelf_pitch_m: float = 0.5
-    load_share: float = 0.6
-    hatches: int = 2
-    hatch_m: float = 1.6
-    flight_height_m: float = 1.1
-    clearance_m: float = 0.4
+    advice = "raise hatch_m or hatches, or lower racks"
+
+    size_m: indoor.Size = (12.78, 6.06, 8.46)  # m, inner length, width, height: paper 2's test hall
+    storeys: Annotated[int, at_least(2)] = 4  # storeys of shelves, joined by hatches only [ours]
+    racks: Whole = 2  # rows of racks on each storey [ours]
+    rack_depth_m: Positive = 0.8  # m, depth of a rack row [ours]
+    shelf_pitch_m: Annotated[float, at_least(4 * SHELF_M), FINITE] = (
+        0.5  # m, height from shelf to shelf [ours]
+    )
+    load_share: Share = 0.6  # 0 to 1, share of shelf places that hold goods [ours]
+    hatches: Count = 2  # openings in each deck [ours]
+    hatch_m: Positive = 1.6  # m, length of a hatch along its aisle [ours]
+    flight_height_m: Positive = 1.1  # m, of start and target above their storey's deck [ours]
+    clearance_m: Positive = 0.4
 
     def __post_init__(self) -> None:
-        require(self.storeys >= 2, f"storeys must be >= 2, got {self.storeys}")
-        require(self.racks >= 0, f"racks must be >= 0, got {self.racks}")
-        require(self.hatches >= 1, f"hatches must be >= 1, got {self.hatches}")
-        self.size_m = indoor.checked_size(self.size_m, self.flight_height_m, self.clearance_m)
-        require_positive(
-            rack_depth_m=self.rack_depth_m, shelf_pitch_m=self.shelf_pitch_m, hatch_m=self.hatch_m
-        )
-        require(0.0 <= self.load_share <= 1.0, f"load_share must be 0 to 1, got {self.load_share}")
+        indoor.Indoor.__post_init__(self)
         aisle = self._aisle_m()
         require(
             aisle >= 2.0 * self.clearance_m + 0.1,
             f"racks and rack_depth_m leave aisles of {aisle:.2f} m, less than twice clearance_m and 0.1 m",
-        )
-        require(
-            self.shelf_pitch_m >= 4.0 * SHELF_M,
-            f"shelf_pitch_m must be >= {4.0 * SHELF_M:g} m, got {self.shelf_pitch_m}",
         )
         headroom = self.size_m[2] / self.storeys - DECK_M - self.flight_height_m
         require(
@@ -92,39 +72,8 @@ class Multilevel:
         """Top side of each storey's floor (storeys,), the ground first."""
         return np.arange(self.storeys) * self.size_m[2] / self.storeys
 
-    def generate(self, rng: np.random.Generator) -> World:
-        """Return the world; raise `WorldError` when no drawing joins start and target."""
-        size = np.array(self.size_m)
-        inset = np.array([indoor.WALL_INSET_M, indoor.WALL_INSET_M, indoor.FLOOR_INSET_M])
-        flight_bounds = np.stack([inset, size - inset])
-        margin = WALL_M + 0.05
-        for _ in range(indoor.ATTEMPTS):
-            boxes = Boxes()
-            boxes.shell(self.size_m)
-            self._furnish(boxes, rng)
-            vertices, triangles = boxes.mesh()
-            scene = Scene.from_mesh(vertices, triangles)
-            ends = self._ends(scene, flight_bounds, rng)
-            if ends is None:
-                continue
-            path = task.shortest_path(scene, flight_bounds, ends[0], ends[1], self.clearance_m)
-            if path.shape[0] > 0:
-                return task.assemble(
-                    name="multilevel",
-                    scene=scene,
-                    vertices_m=vertices,
-                    triangles=triangles,
-                    bounds_m=np.stack([np.full(3, -margin), size + margin]),
-                    flight_bounds_m=flight_bounds,
-                    path_m=path,
-                )
-        message = (
-            f"multilevel: none of {indoor.ATTEMPTS} drawings joins the storeys with {self.clearance_m:g} m "
-            "of clearance; raise hatch_m or hatches, or lower racks"
-        )
-        raise WorldError(message)
-
-    def _furnish(self, boxes: Boxes, rng: np.random.Generator) -> None:
+    def furnish(self, boxes: Boxes, rng: np.random.Generator) -> None:
+        """Decks with hatches, and the racks of every storey."""
         decks = self.deck_heights_m()
         ceilings = np.append(decks[1:] - DECK_M, self.size_m[2])
         for storey in range(self.storeys):
@@ -199,7 +148,7 @@ class Multilevel:
                         ),
                     )
 
-    def _ends(
+    def ends(
         self, scene: Scene, flight_bounds: Float, rng: np.random.Generator
     ) -> tuple[Float, Float] | None:
         """Draw start and target from opposite corners, on the lowest and the highest storey."""

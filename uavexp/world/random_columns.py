@@ -2,62 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from uavexp.errors import require, require_non_negative
-from uavexp.types import World
+from uavexp.parameters import NonNegative, Range, Share, between, option
 from uavexp.world import indoor
 from uavexp.world.boxes import Boxes
 
 
-@dataclass(slots=True, kw_only=True)
-class RandomColumns:
-    """Round and square columns at random places, at least `gap_m` from one another.
+@option
+class RandomColumns(indoor.Indoor):
+    """Round and square columns at random places, at least `gap_m` from one another."""
 
-    Attributes:
-        size_m: inner size of the hall [x, y, z], m.
-        density_per_m2: columns asked for per m² of floor, 1/m²; fewer where no room is left.
-        width_m: least and greatest width [min, max], m.
-        gap_m: least free distance between two columns of different rows, about, m.
-        row: greatest number of columns that stand side by side in one row, each row 1 to `row` long.
-        partial_share: share that reaches only from the ceiling down or the floor up, 0 to 1.
-        flight_height_m: z of start and target, m.
-        clearance_m: guaranteed distance of the body's centre from everything, m.
-    """
+    advice = "lower density_per_m2 or clearance_m, or raise gap_m"
 
-    size_m: Sequence[float] = (26.0, 16.0, 3.0)
-    density_per_m2: float = 0.3
-    width_m: Sequence[float] = (0.3, 1.2)
-    gap_m: float = 1.0
-    row: int = 4
-    partial_share: float = 0.3
-    flight_height_m: float = 1.2
-    clearance_m: float = 0.45
+    size_m: indoor.Size = (26.0, 16.0, 3.0)  # m, inner length, width, height of the hall
+    density_per_m2: Annotated[float, between(0, 5)] = 0.3  # 1/m², columns asked for per floor area;
+    # fewer where no room is left [ours]
+    width_m: Range = (0.3, 1.2)  # m, least and greatest column width [ours]
+    gap_m: NonNegative = 1.0  # m, least free distance between two columns of different rows, about [ours]
+    row: Annotated[int, between(1, 50)] = 4  # greatest number of columns side by side in one row [ours]
+    partial_share: Share = 0.3  # 0 to 1, share that hangs from the ceiling or is a stump [ours]
 
-    def __post_init__(self) -> None:
-        self.size_m = indoor.checked_size(self.size_m, self.flight_height_m, self.clearance_m)
-        require_non_negative(density_per_m2=self.density_per_m2, gap_m=self.gap_m)
-        require(self.density_per_m2 <= 5.0, f"density_per_m2 must be <= 5, got {self.density_per_m2}")
-        self.width_m = indoor.checked_range("width_m", self.width_m)
-        require(1 <= self.row <= 50, f"row must be 1 to 50 columns, got {self.row}")
-        require(0.0 <= self.partial_share <= 1.0, f"partial_share must be 0 to 1, got {self.partial_share}")
-
-    def generate(self, rng: np.random.Generator) -> World:
-        """Return the world; raise `WorldError` when no drawing joins start and target."""
-        return indoor.draw(
-            name="random_columns",
-            furnish=self._furnish,
-            size_m=tuple(self.size_m),
-            flight_height_m=self.flight_height_m,
-            clearance_m=self.clearance_m,
-            advice="lower density_per_m2 or clearance_m, or raise gap_m",
-            rng=rng,
-        )
-
-    def _furnish(self, boxes: Boxes, rng: np.random.Generator) -> None:
+    def furnish(self, boxes: Boxes, rng: np.random.Generator) -> None:
+        """Stand or hang columns, alone and in rows."""
         length, width, _ = self.size_m
         taken: list[tuple[float, float, float]] = []
         missing = round(self.density_per_m2 * length * width)

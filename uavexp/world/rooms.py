@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from uavexp.errors import require, require_non_negative, require_positive
-from uavexp.types import World
+from uavexp.errors import require
+from uavexp.parameters import Positive, Share, between, option
 from uavexp.world import indoor
 from uavexp.world.boxes import Boxes
 
@@ -51,35 +51,22 @@ class Room:
         return self.high[0] - self.low[0], self.high[1] - self.low[1]
 
 
-@dataclass(slots=True, kw_only=True)
-class Rooms:
-    """Rooms made by halving the floor again and again, with a door in every dividing wall.
+@option
+class Rooms(indoor.Indoor):
+    """Rooms made by halving the floor again and again, with a door in every dividing wall."""
 
-    Attributes:
-        size_m: inner size of the floor [x, y, z], m.
-        room_m: least side of a room, m; sides reach about twice that.
-        door_width_m: free width of a door, m.
-        door_height_m: free height of a door, under its lintel, m.
-        second_door_share: share of long dividing walls with a second door, 0 to 1.
-        furniture_per_m2: pieces along the walls per m² of floor, 1/m².
-        table_share: share of rooms with a table, its chairs, and a lamp over it, 0 to 1.
-        flight_height_m: z of start and target, m.
-        clearance_m: guaranteed distance of the body's centre from everything, m.
-    """
+    advice = "lower furniture_per_m2, or raise door_width_m or room_m"
 
-    size_m: Sequence[float] = (22.0, 13.0, 2.8)
-    room_m: float = 3.6
-    door_width_m: float = 1.25
-    door_height_m: float = 2.1
-    second_door_share: float = 0.5
-    furniture_per_m2: float = 0.2
-    table_share: float = 0.6
-    flight_height_m: float = 1.2
-    clearance_m: float = 0.45
+    size_m: indoor.Size = (22.0, 13.0, 2.8)  # m, inner length, width, height
+    room_m: Positive = 3.6  # m, least side of a room [ours]
+    door_width_m: Positive = 1.25  # m, free width of a door [ours]
+    door_height_m: Positive = 2.1  # m, free height under its lintel [ours]
+    second_door_share: Share = 0.5  # 0 to 1, share of dividing walls with a second door [ours]
+    furniture_per_m2: Annotated[float, between(0, 5)] = 0.2  # 1/m², pieces along the walls [ours]
+    table_share: Share = 0.6  # 0 to 1, share of rooms with a table, chairs and a lamp [ours]
 
     def __post_init__(self) -> None:
-        self.size_m = indoor.checked_size(self.size_m, self.flight_height_m, self.clearance_m)
-        require_positive(room_m=self.room_m, door_width_m=self.door_width_m, door_height_m=self.door_height_m)
+        indoor.Indoor.__post_init__(self)
         require(
             self.door_width_m >= 2.0 * self.clearance_m,
             f"door_width_m must be at least twice clearance_m, {2.0 * self.clearance_m:g} m, "
@@ -89,27 +76,9 @@ class Rooms:
         require(
             self.room_m >= least, f"room_m must be at least {least:g} m to hold a door, got {self.room_m}"
         )
-        require(
-            0.0 <= self.second_door_share <= 1.0,
-            f"second_door_share must be 0 to 1, got {self.second_door_share}",
-        )
-        require(0.0 <= self.table_share <= 1.0, f"table_share must be 0 to 1, got {self.table_share}")
-        require_non_negative(furniture_per_m2=self.furniture_per_m2)
-        require(self.furniture_per_m2 <= 5.0, f"furniture_per_m2 must be <= 5, got {self.furniture_per_m2}")
 
-    def generate(self, rng: np.random.Generator) -> World:
-        """Return the world; raise `WorldError` when no drawing joins start and target."""
-        return indoor.draw(
-            name="rooms",
-            furnish=self._furnish,
-            size_m=tuple(self.size_m),
-            flight_height_m=self.flight_height_m,
-            clearance_m=self.clearance_m,
-            advice="lower furniture_per_m2, or raise door_width_m or room_m",
-            rng=rng,
-        )
-
-    def _furnish(self, boxes: Boxes, rng: np.random.Generator) -> None:
+    def furnish(self, boxes: Boxes, rng: np.random.Generator) -> None:
+        """Divide the floor into rooms with doors and put furniture into them."""
         whole = Room(low=(0.0, 0.0), high=(self.size_m[0], self.size_m[1]))
         doors: list[tuple[float, float, float]] = []
         rooms = self._split(boxes, rng, whole, doors)

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-
 import numpy as np
 
-from uavexp.errors import require, require_non_negative, require_positive
-from uavexp.types import World
+from uavexp.errors import require
+from uavexp.parameters import NonNegative, Positive, option
 from uavexp.world import indoor
 from uavexp.world.boxes import Boxes
 
@@ -16,47 +13,26 @@ SLICE_M = 1.0  # length of the slices that the rock is made of
 VAULT = ((0.25, 0.5), (0.5, 0.25))  # steps of the vault: width at each side and height from the crown, m
 
 
-@dataclass(slots=True, kw_only=True)
-class Tunnel:
-    """Rock left and right of a passage that goes from one corner of the map to the opposite one.
+@option
+class Tunnel(indoor.Indoor):
+    """Rock left and right of a passage that goes from one corner of the map to the opposite one."""
 
-    Attributes:
-        size_m: inner size of the box that holds it [x, y, z], m; x is the way through.
-        width_m: of the passage, m.
-        roughness_m: by how much each slice of a wall stands forward or back at most, m.
-        flight_height_m: z of start and target, m.
-        clearance_m: guaranteed distance of the body's centre from everything, m.
-    """
+    advice = "lower roughness_m, or raise width_m"
 
-    size_m: Sequence[float] = (24.0, 9.0, 3.2)
-    width_m: float = 3.6
-    roughness_m: float = 0.1
-    flight_height_m: float = 1.2
-    clearance_m: float = 0.45
+    size_m: indoor.Size = (24.0, 9.0, 3.2)  # m, inner length, width, height of the box that holds it [ours]
+    width_m: Positive = 3.6  # m, of the passage [ours]
+    roughness_m: NonNegative = 0.1  # m, by which each metre of a wall stands forward or back at most [ours]
 
     def __post_init__(self) -> None:
-        self.size_m = indoor.checked_size(self.size_m, self.flight_height_m, self.clearance_m)
-        require_positive(width_m=self.width_m)
-        require_non_negative(roughness_m=self.roughness_m)
+        indoor.Indoor.__post_init__(self)
         least = 2.0 * (self.clearance_m + self.roughness_m) + 1.5
         require(
             least <= self.width_m <= self.size_m[1] - 0.5,
             f"width_m must be {least:g} m to {self.size_m[1] - 0.5:g} m, got {self.width_m}",
         )
 
-    def generate(self, rng: np.random.Generator) -> World:
-        """Return the world; raise `WorldError` when no drawing joins start and target."""
-        return indoor.draw(
-            name="tunnel",
-            furnish=self._furnish,
-            size_m=tuple(self.size_m),
-            flight_height_m=self.flight_height_m,
-            clearance_m=self.clearance_m,
-            advice="lower roughness_m, or raise width_m",
-            rng=rng,
-        )
-
-    def _furnish(self, boxes: Boxes, rng: np.random.Generator) -> None:
+    def furnish(self, boxes: Boxes, rng: np.random.Generator) -> None:
+        """Rock on both sides of the passage, slice by slice."""
         length, across, height = self.size_m
         slices = int(np.ceil(length / SLICE_M))
         edges = np.linspace(0.0, length, slices + 1)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from uavexp.errors import require, require_non_negative, require_positive
-from uavexp.types import World
+from uavexp.errors import require
+from uavexp.parameters import Positive, Share, Whole, between, option
 from uavexp.world import indoor
 from uavexp.world.boxes import Boxes
 
@@ -24,60 +23,35 @@ LITTER_TO_WALL_M = 0.75  # of an item's middle: half a pallet's diagonal
 CLUTTER_GAP_M = 0.2  # least distance between two clutter items
 
 
-@dataclass(slots=True, kw_only=True)
-class Warehouse:
-    """Racks along x with aisles between, every row broken by cross aisles at its own places.
+@option
+class Warehouse(indoor.Indoor):
+    """Racks along x with aisles between, every row broken by cross aisles at its own places."""
 
-    Attributes:
-        size_m: inner size of the hall [x, y, z], m.
-        aisle_m: width of aisles and cross aisles, m.
-        rack_depth_m: depth of a rack row, m.
-        cross_aisles: gaps in each row, besides its two free ends.
-        load_share: share of shelf places that hold goods, 0 to 1.
-        clutter_per_m2: pallets, cartons and stacks asked for per m² of hall, 1/m²; fewer where
-            racks or others are in the way.
-        pillars: whether square pillars stand on a regular grid.
-        ducts: number of ducts and beams that hang across the hall under the ceiling.
-        flight_height_m: z of start and target, m.
-        clearance_m: guaranteed distance of the body's centre from everything, m.
-    """
+    advice = "lower clutter_per_m2 or raise aisle_m"
 
-    size_m: Sequence[float] = (26.0, 16.0, 3.0)
-    aisle_m: float = 2.2
-    rack_depth_m: float = 1.0
-    cross_aisles: int = 2
-    load_share: float = 0.7
-    clutter_per_m2: float = 0.14
-    pillars: bool = True
-    ducts: int = 3
-    flight_height_m: float = 1.2
-    clearance_m: float = 0.45
+    size_m: indoor.Size = (
+        26.0,
+        16.0,
+        3.0,
+    )  # m, inner length, width, height: missions of 25 to 30 m as in paper 1
+    aisle_m: Positive = 2.2  # m, width of aisles and cross aisles [ours]
+    rack_depth_m: Positive = 1.0  # m, depth of a rack row [ours]
+    cross_aisles: Whole = 2  # gaps in each rack row besides its two free ends [ours]
+    load_share: Share = 0.7  # 0 to 1, share of shelf places that hold goods [ours]
+    clutter_per_m2: Annotated[float, between(0, 5)] = 0.14  # 1/m², pallets, cartons and stacks asked for;
+    # fewer where racks stand [ours]
+    pillars: bool = True  # square pillars on a 6.5 m grid [ours]
+    ducts: Whole = 3  # ducts and beams that hang across the hall [ours]
 
     def __post_init__(self) -> None:
-        self.size_m = indoor.checked_size(self.size_m, self.flight_height_m, self.clearance_m)
-        require_positive(aisle_m=self.aisle_m, rack_depth_m=self.rack_depth_m)
+        indoor.Indoor.__post_init__(self)
         require(
             self.aisle_m >= 2.0 * self.clearance_m,
             f"aisle_m must be at least twice clearance_m, {2.0 * self.clearance_m:g} m, got {self.aisle_m}",
         )
-        require_non_negative(cross_aisles=self.cross_aisles, ducts=self.ducts)
-        require(0.0 <= self.load_share <= 1.0, f"load_share must be 0 to 1, got {self.load_share}")
-        clutter = self.clutter_per_m2
-        require(0.0 <= clutter <= 5.0, f"clutter_per_m2 must be 0 to 5, got {clutter}")
 
-    def generate(self, rng: np.random.Generator) -> World:
-        """Return the world; raise `WorldError` when no drawing joins start and target."""
-        return indoor.draw(
-            name="warehouse",
-            furnish=self._furnish,
-            size_m=tuple(self.size_m),
-            flight_height_m=self.flight_height_m,
-            clearance_m=self.clearance_m,
-            advice="lower clutter_per_m2 or raise aisle_m",
-            rng=rng,
-        )
-
-    def _furnish(self, boxes: Boxes, rng: np.random.Generator) -> None:
+    def furnish(self, boxes: Boxes, rng: np.random.Generator) -> None:
+        """Racks, pillars, clutter in the aisles, and ducts under the ceiling."""
         width = self.size_m[1]
         rows = int((width - self.aisle_m) / (self.rack_depth_m + self.aisle_m))
         aisle = (width - rows * self.rack_depth_m) / (rows + 1)

@@ -1,0 +1,31 @@
+"""What every vehicle is: a box of some mass, and limits that may be asked of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from uavexp.parameters import Positive
+from uavexp.types import Limits
+
+
+@dataclass(slots=True, kw_only=True)
+class Body:
+    """Parameters that every vehicle has; no state."""
+
+    mass_kg: Positive = 0.75  # kg; paper 4
+    length_m: Positive = 0.32  # m, body box along x; paper 1
+    width_m: Positive = 0.32  # m, body box along y; paper 1
+    height_m: Positive = 0.12  # m, body box along z; paper 1
+    max_speed_mps: Positive = 2.5  # m/s; paper 1
+    max_acceleration_mps2: Positive = 2.5  # m/s^2 [ours]
+    max_body_rate_radps: Positive = 2.0  # rad/s, of each axis; paper 1 (axes [ours])
+
+    @property
+    def limits(self) -> Limits:
+        """What may be asked of it."""
+        return Limits(
+            max_speed_mps=self.max_speed_mps,
+            max_acceleration_mps2=self.max_acceleration_mps2,
+            max_body_rate_radps=self.max_body_rate_radps,
+            body_size_m=(self.length_m, self.width_m, self.height_m),
+        )
