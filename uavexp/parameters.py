@@ -18,12 +18,11 @@ import types
 import typing
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import Enum, StrEnum
-from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from uavexp.errors import ConfigError, require
 
 MISSING = "???"  # OmegaConf's mark of a value that must be given
-T = TypeVar("T")
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -79,21 +78,13 @@ class Unknown(StrEnum):
 
 
 @typing.dataclass_transform(kw_only_default=True, field_specifiers=(dataclasses.field,))
-def option(cls: type[T]) -> type[T]:
+def option(cls: Any = None, /, *, frozen: bool = False) -> Any:
     """Make a class an option of its group: a dataclass whose parameters are checked and converted.
 
     Its own `__post_init__` comes after that, for what ties parameters together.
     """
-    return _checked(cls, frozen=False)
-
-
-@typing.dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(dataclasses.field,))
-def frozen_option(cls: type[T]) -> type[T]:
-    """An `option` that nothing changes: what runs is an object of its own."""
-    return _checked(cls, frozen=True)
-
-
-def _checked(cls: type[T], *, frozen: bool) -> type[T]:
+    if cls is None:
+        return functools.partial(option, frozen=frozen)
     then = getattr(cls, "__post_init__", None)
 
     def __post_init__(self: Any) -> None:
@@ -102,9 +93,9 @@ def _checked(cls: type[T], *, frozen: bool) -> type[T]:
         if then is not None:
             then(self)
 
-    cls.__post_init__ = __post_init__  # type: ignore[attr-defined]
-    cls.__option__ = True  # type: ignore[attr-defined]
-    return dataclasses.dataclass(slots=True, kw_only=True, frozen=frozen)(cls)
+    cls.__post_init__ = __post_init__
+    cls.__option__ = True
+    return dataclasses.dataclass(frozen=frozen, slots=True, kw_only=True)(cls)
 
 
 def is_option(item: object) -> bool:
@@ -249,8 +240,8 @@ def _convert_scalar(value: Any, kind: type) -> Any:
     return value
 
 
-def _sequence(value: Any) -> list[Any] | tuple[Any, ...]:
-    if not isinstance(value, list | tuple):
+def _sequence(value: Any) -> Sequence[Any]:
+    if not isinstance(value, Sequence) or isinstance(value, str):  # OmegaConf's lists are no `list`
         raise TypeError
     return value
 

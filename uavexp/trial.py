@@ -18,7 +18,7 @@ from uavexp.log import TrialLog
 from uavexp.mapping.base import MapBackend
 from uavexp.mission.base import Mission
 from uavexp.movers.base import Movers
-from uavexp.parameters import NonNegative, Positive, Whole, frozen_option
+from uavexp.parameters import NonNegative, Positive, Whole, option
 from uavexp.pilot.base import Crew, Pilot, Piloting
 from uavexp.planner.base import Planner
 from uavexp.recorder import Recorder, Stopwatch, seen_share
@@ -37,7 +37,7 @@ _LOOK_STEPS = 100  # steps between two looks at whether the vehicle still moves
 _STILL_M = 0.3  # moved less in `stuck_s`: stuck
 
 
-@frozen_option
+@option(frozen=True)
 class Parts:
     """One component per role and the few numbers that belong to no role."""
 

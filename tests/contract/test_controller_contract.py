@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.components import build, check_yaml, numbers, options
+from tests.components import build, numbers, options
 from uavexp.errors import ConfigError
 from uavexp.geometry import GRAVITY_MPS2, rotation_from_quaternion, yaw_of
 from uavexp.types import Limits, Reference, State
@@ -34,10 +34,6 @@ def asked(
         yaw_rad=yaw,
     )
     return controller.command(state, reference)
-
-
-def test_yaml_lists_every_parameter(option):
-    check_yaml("controller", option)
 
 
 def test_on_the_reference_it_lifts_the_weight(option):

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.components import build, check_yaml, numbers, options
+from tests.components import build, numbers, options
 from tests.detections import WALLS, bodies_at, room_map, scans, straight
 from uavexp.check.hall import LIMITS
 from uavexp.check.scans import take_scan
@@ -31,10 +31,6 @@ def flown(made: Any) -> list[tuple[Scan, Scan, Tracks]]:
         (scan, *made.detect(scan, field, bodies))
         for scan, bodies in scans(PATHS, 1.5, noise=np.random.default_rng(1))
     ]
-
-
-def test_yaml_lists_every_parameter(option: str) -> None:
-    check_yaml("detection", option)
 
 
 def test_a_scan_only_loses_returns(option: str) -> None:

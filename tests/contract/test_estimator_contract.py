@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from tests.components import build, check_yaml, numbers, options
+from tests.components import build, numbers, options
 from uavexp.errors import ConfigError
 from uavexp.seeding import Stream, generator
 from uavexp.types import State
@@ -28,10 +28,6 @@ def estimates(option, seed, count=200):
     estimator = build("estimator", option)
     estimator.reset(generator(seed, Stream.ESTIMATOR))
     return [estimator.estimate(still(), 0.01) for _ in range(count)]
-
-
-def test_yaml_lists_every_parameter(option):
-    check_yaml("estimator", option)
 
 
 def test_begins_at_the_truth(option):

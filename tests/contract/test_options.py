@@ -20,7 +20,6 @@ from uavexp.config.build import (
     TARGET,
     build_component,
     component_class,
-    nested_groups,
     protocol_members,
     protocol_of,
     top_level,
@@ -29,7 +28,7 @@ from uavexp.config.composition import Composer
 from uavexp.config.generate import option_files
 from uavexp.config.options import PRESET_GROUP, RUNNER_GROUP, read_option
 from uavexp.config.overrides import Setting, parse_settings
-from uavexp.parameters import MISSING, check_value, parameter_types, plain, required_parameters
+from uavexp.parameters import MISSING, parameter_types
 from uavexp.paths import PACKAGE, conf_folder
 from uavexp.trial import Parts
 
@@ -47,14 +46,8 @@ PRESETS = sorted(file.stem for file in (CONF / PRESET_GROUP).glob("*.yaml"))
 COMPOSER = Composer()
 
 
-SHARED = yaml.safe_load((CONF / "config.yaml").read_text())  # keys that options may refer to
-
-
 def load(group: str, option: str) -> dict[str, object]:
-    tree = dict(yaml.safe_load((folder_of(CONF, group) / f"{option}.yaml").read_text()))
-    tree.pop("defaults", None)  # options of its group that it holds
-    references = {key: re.fullmatch(r"\$\{(\w+)\}", str(value)) for key, value in tree.items()}
-    return {key: SHARED[match[1]] if (match := references[key]) else tree[key] for key in tree}
+    return dict(yaml.safe_load((folder_of(CONF, group) / f"{option}.yaml").read_text()))
 
 
 def values(tree: dict[str, object]) -> dict[str, object]:
@@ -81,8 +74,9 @@ def test_the_defaults_of_no_group_are_those_of_a_trial() -> None:
 
 
 def test_the_yaml_of_every_option_is_what_make_conf_writes() -> None:
-    for path, text in option_files().items():
-        assert path.read_text(encoding="utf-8") == text, "make conf"
+    made = option_files()
+    assert made == {path: path.read_text(encoding="utf-8") for path in made}, "make conf"
+    assert {folder_of(CONF, group) / f"{option}.yaml" for group, option in OPTIONS} <= set(made)
 
 
 @pytest.mark.parametrize("group", ALL_GROUPS)
@@ -97,24 +91,6 @@ def test_an_option_is_a_class_in_the_module_of_its_name(group: str, option: str)
     cls = component_class(group, target)
     assert target == f"uavexp.{group}.{option}.{cls.__name__}"
     assert cls.__module__ == f"uavexp.{group}.{option}"
-
-
-@pytest.mark.parametrize(("group", "option"), OPTIONS)
-def test_yaml_and_class_have_the_same_parameters_and_defaults(group: str, option: str) -> None:
-    tree = load(group, option)
-    cls = component_class(group, str(tree[TARGET]))
-    annotations = parameter_types(cls)
-    own = [name for name in annotations if name in tree or name not in nested_groups(cls)]
-    assert list(values(tree)) == own, "same names in the same order"
-    for name, value in values(tree).items():
-        if value == MISSING:
-            assert name in required_parameters(cls)
-            continue
-        default = inspect.signature(cls).parameters[name].default
-        if default is not inspect.Parameter.empty:  # a field with a default factory shows a marker
-            shown = repr(default) != "<factory>"
-            converted = plain(check_value(name, value, annotations[name]))
-            assert not shown or converted == plain(default), f"{name}: yaml {value!r}, class {default!r}"
 
 
 @pytest.mark.parametrize(("group", "option"), OPTIONS)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.components import build, check_yaml, numbers, options
+from tests.components import build, numbers, options
 from tests.logs import make_world
 from uavexp.errors import ConfigError
 from uavexp.geometry import quaternion_from_yaw
@@ -58,10 +58,6 @@ def points_of(scan: Scan) -> np.ndarray:
     z = scan.depth_m[v, u].astype(np.float64)
     x, y = (u - scan.centre_px[0]) / scan.focal_px[0] * z, (v - scan.centre_px[1]) / scan.focal_px[1] * z
     return scan.camera_position_m + np.stack([x, y, z], axis=1) @ scan.camera_rotation.T
-
-
-def test_yaml_lists_every_parameter(option):
-    check_yaml("sensor", option)
 
 
 def test_measurements_are_positive_beyond_or_missing(option, scene):

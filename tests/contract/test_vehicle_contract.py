@@ -7,7 +7,7 @@ import copy
 import numpy as np
 import pytest
 
-from tests.components import build, check_yaml, numbers, options
+from tests.components import build, numbers, options
 from uavexp.errors import ConfigError
 from uavexp.geometry import GRAVITY_MPS2, quaternion_from_yaw
 from uavexp.types import Command, Limits, State
@@ -28,10 +28,6 @@ def at_rest(yaw_rad: float = 0.0) -> State:
 def rolled(angle_rad: float, thrust_N: float) -> Command:
     q = np.array([np.cos(angle_rad / 2), np.sin(angle_rad / 2), 0.0, 0.0])
     return Command(thrust_N=thrust_N, quaternion_wxyz=q, body_rate_radps=np.zeros(3))
-
-
-def test_yaml_lists_every_parameter(option):
-    check_yaml("vehicle", option)
 
 
 def test_limits_are_paper_1s(option):

@@ -24,6 +24,7 @@ from typing import Any
 import yaml  # type: ignore[import-untyped]
 
 from uavexp.config.build import GROUPS, TARGET, component_class, nested_groups
+from uavexp.config.options import RUNNER_GROUP
 from uavexp.parameters import MISSING, Unknown, is_option, parameter_types, plain
 from uavexp.paths import PACKAGE, conf_folder
 
@@ -32,7 +33,7 @@ def option_files() -> dict[Path, str]:
     """Path and text of the yaml of every option of the package."""
     held = [f"{base.parent.parent.name}.{base.parent.name}" for base in PACKAGE.glob("*/*/base.py")]
     classes = [cls for group in (*GROUPS, *held) for cls in _options(group)]
-    return {_place(cls): option_yaml(cls) for cls in classes}
+    return {_place(cls): option_yaml(cls) for cls in classes} | _runner_file()
 
 
 def option_yaml(cls: type) -> str:
@@ -47,6 +48,13 @@ def parameter_lines(cls: type) -> list[str]:
     said = {name: text for base in bases for name, text in _comments(base).items() if text}
     fields = [item for item in dataclasses.fields(cls) if item.init and item.name not in _held(cls)]
     return [f"{item.name}: {_default(cls, item)}  # {said.get(item.name, '')}".rstrip() for item in fields]
+
+
+def _runner_file() -> dict[Path, str]:
+    """The runner is no part of a trial and no target: its parameters under what it says of itself."""
+    runner = importlib.import_module("uavexp.sweep.runner").Runner
+    text = "\n".join([f"# {inspect.getdoc(runner)}", *parameter_lines(runner)])
+    return {conf_folder() / RUNNER_GROUP / "local.yaml": f"{text}\n"}
 
 
 def _defaults_list(cls: type) -> list[str]:

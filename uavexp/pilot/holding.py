@@ -18,7 +18,7 @@ from uavexp import causes
 from uavexp.arrays import Float
 from uavexp.braking import braking_trajectory, with_stop
 from uavexp.log import Replan
-from uavexp.parameters import Count, NonNegative, frozen_option
+from uavexp.parameters import Count, NonNegative, option
 from uavexp.pilot.base import Crew
 from uavexp.pilot.heading import Heading, bearing_rad
 from uavexp.pilot.noting import replan_of
@@ -30,7 +30,7 @@ _REST_MPS = 0.05  # slower is standing
 _YAW_SHARE = 0.9  # of the body-rate limit: roll and pitch need theirs
 
 
-@frozen_option
+@option(frozen=True)
 class Holding:
     """The rules; `HoldingPilot` flies by them."""
 

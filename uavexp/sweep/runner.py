@@ -5,12 +5,11 @@ from __future__ import annotations
 import os
 import platform
 from collections.abc import Mapping
-from dataclasses import dataclass
 from enum import StrEnum
 from typing import Annotated, Any
 
 from uavexp.errors import require
-from uavexp.parameters import Constraint, Positive, check_value, parameter_types
+from uavexp.parameters import Constraint, Positive, check_value, option, parameter_types
 from uavexp.sweep.job import Limits
 
 
@@ -27,18 +26,22 @@ class Queue(StrEnum):
     SLURM = "slurm"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@option(frozen=True)
 class Runner:
-    """The parameters of `conf/runner/*.yaml`."""
+    """Every trial in a process of its own on this machine."""
 
-    backend: Backend
-    n_jobs: Annotated[int, Constraint("-1 or >= 1", lambda n_jobs: n_jobs == -1 or n_jobs >= 1)]
-    timeout_s: Positive
-    memory_mb: Positive
-    dry_run: bool
-    accept_other_code: bool
-    address: str | None
-    queue: Queue | None
+    backend: Backend = Backend.LOCAL  # local | dask
+    n_jobs: Annotated[int, Constraint("-1 or >= 1", lambda jobs: jobs == -1 or jobs >= 1)] = -1  # trials at
+    # a time, with backend dask workers to start; -1: as many as there are cores
+    timeout_s: Positive = 900.0  # s of clock time after which a trial counts as hung and is ended
+    memory_mb: Positive = 4096.0  # MB that one trial may take on top of a fresh process
+    dry_run: bool = False  # list what would be flown and fly nothing
+    accept_other_code: bool = False  # keep finished trials of another version of uavexp or its packages
+    # among the new ones
+    address: str | None = None  # with backend dask: tcp://HOST:8786 of a running scheduler;
+    # null: start n_jobs workers
+    queue: Queue | None = None  # with backend dask and no address: where they start; null:
+    # on this machine | slurm (partition, account and time from Dask's jobqueue.yaml)
 
     def __post_init__(self) -> None:
         if self.queue is not None:
@@ -47,7 +50,7 @@ class Runner:
                 self.address is None,
                 "give runner.address or runner.queue, not both: a cluster or a way to one",
             )
-        if self.backend != Backend.DASK:
+        if self.backend is not Backend.DASK:
             require(self.address is None and self.queue is None, "runner.address and queue need runner=dask")
 
     @property

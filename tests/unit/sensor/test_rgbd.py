@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from hydra.utils import instantiate
@@ -197,16 +199,16 @@ def test_lists_of_hydra_are_taken():
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        ({"width_px": 1}, "width_px must be a whole number, 2 to 4096, got 1"),
-        ({"height_px": 72.5}, "height_px must be a whole number, 2 to 4096, got 72.5"),
-        ({"horizontal_fov_deg": 180.0}, "horizontal_fov_deg must be 1 to 170 deg, got 180.0"),
+        ({"width_px": 1}, "width_px must be 2 to 4096, got 1"),
+        ({"height_px": 72.5}, "height_px must be a whole number, got 72.5"),
+        ({"horizontal_fov_deg": 180.0}, "horizontal_fov_deg must be 1 to 170, got 180.0"),
         ({"min_range_m": 6.0}, "min_range_m must be < max_range_m = 5.0, got 6.0"),
-        ({"mount_offset_m": [0.0, float("nan"), 0.0]}, "mount_offset_m must be three finite numbers"),
-        ({"mount_offset_m": [0.0, 0.0]}, "mount_offset_m must be three finite numbers"),
+        ({"mount_offset_m": [0.0, float("nan"), 0.0]}, r"mount_offset_m[1] must be finite, got nan"),
+        ({"mount_offset_m": [0.0, 0.0]}, "mount_offset_m must be [a number, a number, a number], got"),
         ({"edge_missing_probability": 1.5}, "edge_missing_probability must be 0 to 1, got 1.5"),
-        ({"grazing_angle_deg": 0.0}, "grazing_angle_deg must be > 0 and <= 90 deg, got 0.0"),
+        ({"grazing_angle_deg": 0.0}, "grazing_angle_deg must be > 0 and <= 90, got 0.0"),
     ],
 )
 def test_refuses_bad_parameters(parameters, message):
-    with pytest.raises(ConfigError, match=message):
+    with pytest.raises(ConfigError, match=re.escape(message)):
         Rgbd(**parameters)
