@@ -23,9 +23,9 @@ from uavexp.planner.find.base import FoundPath
 from uavexp.planner.find.free_space import FreeSpace, free_space
 from uavexp.planner.find.grid import Grid
 from uavexp.planner.movers.moving import MovingObstacles
-from uavexp.planner.shape.corridor import make_corridor
+from uavexp.planner.shape.cone_program import NO_CUTS, Problem, Solution, solve
 from uavexp.planner.shape.corridor_qp import CorridorQp, Derivative
-from uavexp.planner.shape.quadratic import NO_CUTS, Problem, Solution, solve
+from uavexp.planner.shape.flight_corridor import make_corridor
 from uavexp.planner.shape.shortcut import shortcut
 from uavexp.planner.shape.timing import resample, smooth, time_profile
 from uavexp.planner.spline.clamped import make_basis

@@ -22,11 +22,9 @@ from functools import partial
 
 import numpy as np
 
-from uavexp.arrays import Float
 from uavexp.braking import braking_trajectory
 from uavexp.errors import require
 from uavexp.parameters import NonNegative, Positive, Unknown
-from uavexp.planner.clearance import shortfall
 from uavexp.planner.constraints import Constraints
 from uavexp.planner.find.base import Finder, FoundPath
 from uavexp.planner.movers.escape import safest_stop
@@ -102,7 +100,7 @@ class FindAndShape:
         if result.trajectory is not None:
             return result
         if len(movers):
-            blocked = partial(_shortfall, request, constraints)
+            blocked = partial(constraints.shortfall, request)
             stop, aside = safest_stop(request, movers, blocked, limits)
             reason = "steps aside first" if aside else "brakes first"
         elif result.status in _MENDED_BY_BRAKING and float(np.linalg.norm(request.velocity_mps)) > REST_MPS:
@@ -111,7 +109,7 @@ class FindAndShape:
         else:
             return result
         way_m = evaluate(stop, sample_times(stop, stop.start_s, _CHECK_S))[0]
-        if _shortfall(request, constraints, way_m):
+        if constraints.shortfall(request, way_m):
             return result
         left = [rung for rung in ladder if rung.margin == ladder[-1].margin]
         onward = partial(self._climb, constraints=constraints, movers=movers, ladder=left)
@@ -194,9 +192,3 @@ def _refusal(request: PlanRequest, limits: Limits) -> PlanResult | None:
     if not (top > 0.0 and most > 0.0):
         return PlanResult(status=PlanStatus.LIMITS, reason=f"limits of {top:g} m/s and {most:g} m/s²")
     return None
-
-
-def _shortfall(request: PlanRequest, constraints: Constraints, points_m: Float) -> str:
-    """Say where a curve through points (P, 3) meets what is mapped; "" where it does not."""
-    strongest = constraints.limits.max_acceleration_mps2
-    return shortfall(request, points_m, constraints.min_clearance_m, strongest, constraints.known_only)

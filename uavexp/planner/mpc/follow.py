@@ -105,7 +105,7 @@ class Follower:
             return False
         if limit_excess(trajectory, self.static.constraints.limits, self.model.step_s) > 1.0:
             return False
-        return not self.static.shortfall(request, evaluate(trajectory, instants(trajectory))[0])
+        return not self.static.constraints.shortfall(request, evaluate(trajectory, instants(trajectory))[0])
 
 
 def _last_motion(guide: Guide, request: PlanRequest, ahead_s: Float) -> Rollout | None:

@@ -11,7 +11,6 @@ import numpy as np
 
 from uavexp.arrays import Float
 from uavexp.braking import braking_trajectory
-from uavexp.planner.clearance import shortfall
 from uavexp.planner.constraints import Constraints
 from uavexp.planner.find.base import Finder
 from uavexp.planner.movers.moving import MovingObstacles
@@ -60,15 +59,9 @@ class StaticPlanner:
     def after_stop(self, request: PlanRequest, stop: Trajectory, failed: PlanResult) -> PlanResult:
         """Come to rest that way, and fly from there; `failed` when that fails, too."""
         way = evaluate(stop, instants(stop))[0]
-        if self.shortfall(request, way):
+        if self.constraints.shortfall(request, way):
             return failed
         return stop_first(request, stop, way[-1], self._attempt, failed, "brakes first")
-
-    def shortfall(self, request: PlanRequest, points_m: Float) -> str:
-        """Say where a curve through these points (P, 3) meets a mapped obstacle; "" when it does not."""
-        kept = self.constraints
-        strongest = kept.limits.max_acceleration_mps2
-        return shortfall(request, points_m, kept.min_clearance_m, strongest, kept.known_only)
 
     def _attempt(self, request: PlanRequest) -> PlanResult:
         """Search and shape once."""
@@ -129,4 +122,4 @@ def still_holds(guide: Guide, request: PlanRequest, planner: StaticPlanner, with
         return False
     times = instants(guide.spline)
     left = evaluate(guide.spline, np.append(phase_s, times[times > phase_s]))[0]
-    return not planner.shortfall(request, left)
+    return not planner.constraints.shortfall(request, left)

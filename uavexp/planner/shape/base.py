@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
@@ -11,20 +10,6 @@ from uavexp.planner.find.base import FoundPath
 from uavexp.planner.movers.moving import MovingObstacles
 from uavexp.trajectory import Trajectory
 from uavexp.types import PlanRequest, PlanStatus
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SmoothResult:
-    """Answer of a smoother: what it cannot do is a status, not an exception."""
-
-    status: PlanStatus
-    trajectory: Trajectory | None = None  # set exactly when status is OK
-    reason: str = ""
-    iterations: int = 0  # of the solver
-
-    def __post_init__(self) -> None:
-        if (self.trajectory is not None) != (self.status is PlanStatus.OK):
-            raise ValueError(f"a result with status {self.status} must have a trajectory iff ok")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,20 +24,6 @@ class ShapedPath:
     def __post_init__(self) -> None:
         if (self.trajectory is not None) != (self.status is PlanStatus.OK):
             raise ValueError(f"a result with status {self.status} must have a trajectory iff ok")
-
-
-def shaped_by(
-    smooth: Callable[..., SmoothResult], request: PlanRequest, found: FoundPath, constraints: Constraints
-) -> ShapedPath:
-    """A smoother's answer."""
-    known = (constraints.limits, constraints.min_clearance_m, constraints.known_only)
-    smoothed = smooth(request, found.path_m, found.times_s, *known)
-    return ShapedPath(
-        status=smoothed.status,
-        reason=smoothed.reason,
-        trajectory=smoothed.trajectory,
-        iterations=smoothed.iterations,
-    )
 
 
 class Shaper(Protocol):

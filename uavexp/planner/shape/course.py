@@ -1,4 +1,4 @@
-"""The path of a smoothing task, and when its points are passed.
+"""The path of a corridor, and when its points are passed.
 
 Straight ways where they are free, timed as early as the limits allow. A start that moves off the path
 is led back to it in an arc, where that is free, so that the corridor begins where the vehicle goes.
@@ -13,12 +13,13 @@ from typing import NamedTuple
 import numpy as np
 
 from uavexp.arrays import Float
+from uavexp.planner.constraints import Constraints
 from uavexp.planner.find.free_space import FreeSpace, free_space, straight_is_free
 from uavexp.planner.shape.shortcut import shortcut
+from uavexp.planner.shape.start import TANGENT_M
 from uavexp.planner.shape.timing import STEP_M, resample, smooth, time_profile
-from uavexp.types import Limits, PlanRequest
+from uavexp.types import PlanRequest
 
-TANGENT_M = 1.0  # length over which the path's first and last direction is taken
 _RESERVE_M = 0.1  # clearance of straight ways above the limit: room to round their corners
 _SMOOTHING_ROUNDS = 10  # of the path that is timed: takes its corners and staircase out
 _SWERVES = (1.0, 2.0)  # decelerations tried, as shares of the limit, of a velocity that is off the path
@@ -31,44 +32,37 @@ class Timed(NamedTuple):
     times: Float  # (P,) s from the start, increasing
 
 
-class Task(NamedTuple):
-    """What is to be smoothed, and within what."""
+class Given(NamedTuple):
+    """What is to be shaped, and within what."""
 
     request: PlanRequest
     path: Float  # (P, 3)
     times: Float | None
-    limits: Limits
-    min_clearance: float
-    known_only: bool
+    constraints: Constraints
 
 
-def space_of(task: Task, reserve_m: float) -> FreeSpace:
+def space_of(given: Given, reserve_m: float) -> FreeSpace:
     """Free space for the way from start to goal, at so much more than the clearance asked for."""
-    request = task.request
-    return free_space(
-        request.field,
-        np.stack([request.position_m, request.goal.position_m]),
-        request.flight_bounds_m,
-        task.min_clearance + reserve_m,
-        math.inf,
-        task.known_only,
-    )
+    request, kept = given.request, given.constraints
+    ends = np.stack([request.position_m, request.goal.position_m])
+    clearance_m = kept.min_clearance_m + reserve_m
+    return free_space(request.field, ends, request.flight_bounds_m, clearance_m, math.inf, kept.known_only)
 
 
-def course(task: Task, end_mps: float, straight: bool) -> Timed:
+def course(given: Given, end_mps: float, straight: bool) -> Timed:
     """The path with its times: those it came with, or the time-optimal traversal from this start.
 
     Args:
-        task: what is to be smoothed.
+        given: what is to be shaped.
         end_mps: speed at the end.
         straight: along straight ways, where they are free, and not the searched path itself.
     """
-    if task.times is not None and straight:
-        return Timed(task.path, task.times)
-    points = shortcut(resample(task.path, STEP_M), space_of(task, _RESERVE_M)) if straight else task.path
+    if given.times is not None and straight:
+        return Timed(given.path, given.times)
+    points = shortcut(resample(given.path, STEP_M), space_of(given, _RESERVE_M)) if straight else given.path
     raw = resample(points, STEP_M)
     path = smooth(raw, _SMOOTHING_ROUNDS)
-    velocity, limits = task.request.velocity_mps, task.limits
+    velocity, limits = given.request.velocity_mps, given.constraints.limits
     ahead = path[min(round(TANGENT_M / STEP_M), len(path) - 1)] - path[0]
     length = float(np.linalg.norm(ahead))
     ahead = ahead / length if length > 1e-9 else np.zeros(3)
@@ -83,7 +77,7 @@ def course(task: Task, end_mps: float, straight: bool) -> Timed:
     times = times * ((total + lost) / total) if total > 0.0 else times + lost
     for harder in _SWERVES:
         swerved = _swerved(raw, times, aside, harder * limits.max_acceleration_mps2)
-        if _is_free(swerved, task):
+        if _is_free(swerved, given):
             return Timed(swerved, times)
     return Timed(raw, times)
 
@@ -100,9 +94,9 @@ def _swerved(points: Float, times: Float, aside_mps: Float, max_acceleration_mps
     return np.asarray(points + offset[:, None] * aside_mps)
 
 
-def _is_free(points: Float, task: Task) -> bool:
+def _is_free(points: Float, given: Given) -> bool:
     """Whether the polyline (P, 3) is clear."""
-    space = space_of(task, 0.0)
+    space = space_of(given, 0.0)
     return all(straight_is_free(space, a, b)[0] for a, b in itertools.pairwise(points))
 
 

@@ -24,7 +24,6 @@ from uavexp.arrays import Float
 from uavexp.braking import jerk_mps3
 from uavexp.field import DistanceField
 from uavexp.parameters import Count, NonNegative, Positive, between, option
-from uavexp.planner.clearance import shortfall
 from uavexp.planner.constraints import Constraints
 from uavexp.planner.find.base import FoundPath
 from uavexp.planner.movers.moving import MovingObstacles
@@ -224,7 +223,7 @@ class _Cubic:
         points = sample_spline(curve.control, per_segment)
         times = request.time_s + np.arange(len(points), dtype=np.float64) * (curve.h / per_segment)
         strongest = constraints.limits.max_acceleration_mps2
-        fixed = shortfall(request, points, constraints.min_clearance_m, strongest, constraints.known_only)
+        fixed = constraints.shortfall(request, points)
         return fixed or self.movers.shortfall(points, times, strongest)
 
     def trajectory(self, curve: Curve) -> Trajectory:

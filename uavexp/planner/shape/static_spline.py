@@ -20,7 +20,6 @@ import numpy as np
 from uavexp.arrays import Float
 from uavexp.braking import stopping_distance_m
 from uavexp.parameters import Count, NonNegative, Positive, between, option
-from uavexp.planner.clearance import shortfall
 from uavexp.planner.constraints import Constraints
 from uavexp.planner.find.base import FoundPath
 from uavexp.planner.movers.moving import MovingObstacles
@@ -101,15 +100,9 @@ class StaticSpline:
         for share in (1.0, 0.7, 0.4):
             stop_m = stopping_distance_m(share * speed, limits) + _AHEAD_M
             ahead = np.arange(0.0, stop_m, _AHEAD_M)[:, None] * along / length
-            if not _shortfall(request, goal_m + ahead, constraints):
+            if not constraints.shortfall(request, goal_m + ahead):
                 return np.asarray(share * speed / length * along)
         return np.zeros(3)
-
-
-def _shortfall(request: PlanRequest, points_m: Float, constraints: Constraints) -> str:
-    """Where a curve through points (P, 3) is not clear (`clearance.shortfall`)."""
-    strongest = constraints.limits.max_acceleration_mps2
-    return shortfall(request, points_m, constraints.min_clearance_m, strongest, constraints.known_only)
 
 
 class _AnyOrder:
@@ -178,7 +171,7 @@ class _AnyOrder:
 
     def shortfall(self, curve: Curve) -> str:
         """`Model.shortfall`, every `instants`."""
-        return _shortfall(self.request, self.points(curve), self.constraints)
+        return self.constraints.shortfall(self.request, self.points(curve))
 
     def trajectory(self, curve: Curve) -> Trajectory:
         """`Model.trajectory`."""

@@ -8,8 +8,31 @@ from dataclasses import replace
 import numpy as np
 
 from uavexp.arrays import Float
-from uavexp.trajectory import Trajectory, join
+from uavexp.braking import braking_trajectory
+from uavexp.planner.constraints import Constraints
+from uavexp.trajectory import Trajectory, evaluate, join, sample_times
 from uavexp.types import PlanRequest, PlanResult
+
+_CHECK_S = 0.02
+
+
+def braking(request: PlanRequest, constraints: Constraints) -> tuple[Trajectory, Float, str]:
+    """The stop in a straight line, its way (P, 3), and where that is not clear; "" when it is."""
+    state = (request.position_m, request.velocity_mps, request.acceleration_mps2)
+    brake = braking_trajectory(request.time_s, *state, constraints.limits)
+    way_m = evaluate(brake, sample_times(brake, brake.start_s, _CHECK_S))[0]
+    return brake, way_m, constraints.shortfall(request, way_m)
+
+
+def standing(request: PlanRequest, time_s: float, position_m: Float) -> PlanRequest:
+    """The same request made later, at rest."""
+    return replace(
+        request,
+        time_s=time_s,
+        position_m=position_m,
+        velocity_mps=np.zeros(3),
+        acceleration_mps2=np.zeros(3),
+    )
 
 
 def stop_first(
@@ -30,14 +53,7 @@ def stop_first(
         failed: the failure of the direct attempt, which stays the answer when this fails, too.
         reason: given with the joined plan.
     """
-    standing = replace(
-        request,
-        time_s=stop.end_s,
-        position_m=rest_m,
-        velocity_mps=np.zeros(3),
-        acceleration_mps2=np.zeros(3),
-    )
-    onward = attempt(standing)
+    onward = attempt(standing(request, stop.end_s, rest_m))
     if onward.trajectory is None:
         return summed(failed, onward, reason)
     path_m = np.concatenate([request.position_m[None], onward.path_m])

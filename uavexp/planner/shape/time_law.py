@@ -17,19 +17,18 @@ from typing import ClassVar
 import numpy as np
 
 from uavexp.arrays import Float
-from uavexp.braking import braking_trajectory, jerk_mps3
+from uavexp.braking import jerk_mps3
 from uavexp.parameters import option
-from uavexp.planner.clearance import shortfall
 from uavexp.planner.constraints import Constraints
 from uavexp.planner.find.base import FoundPath
-from uavexp.planner.find.free_space import free_space
 from uavexp.planner.movers.moving import MovingObstacles
-from uavexp.planner.shape.base import ShapedPath, SmoothResult, shaped_by
+from uavexp.planner.shape.base import ShapedPath
+from uavexp.planner.shape.course import Given, space_of
 from uavexp.planner.shape.shortcut import shortcut
-from uavexp.trajectory import Trajectory, evaluate, join, sample_times
+from uavexp.planner.shape.stop_first import braking, standing
+from uavexp.trajectory import Trajectory, join
 from uavexp.types import Limits, PlanRequest, PlanStatus
 
-_CHECK_S = 0.02
 _SHORTEST_M = 1e-6  # a shorter way is none
 _SHORTEST_S = 0.1  # of a trajectory to where the vehicle already is
 _POWERS = np.array([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
@@ -48,37 +47,19 @@ class TimeLaw:
         del movers
         if found.motion is not None:
             return ShapedPath(status=PlanStatus.OK, trajectory=found.motion)
-        return shaped_by(self.smooth, request, found, constraints)
-
-    def smooth(
-        self,
-        request: PlanRequest,
-        path_m: Float,
-        times_s: Float | None,
-        limits: Limits,
-        min_clearance_m: float,
-        known_only: bool,
-    ) -> SmoothResult:
-        """Return a trajectory that stops at every corner (`Smoother.smooth`)."""
-        del times_s
+        limits, path_m = constraints.limits, found.path_m
         if not (limits.max_speed_mps > 0.0 and limits.max_acceleration_mps2 > 0.0):
             reason = f"limits of {limits.max_speed_mps:g} m/s and {limits.max_acceleration_mps2:g} m/s²"
-            return SmoothResult(status=PlanStatus.LIMITS, reason=reason)
+            return ShapedPath(status=PlanStatus.LIMITS, reason=reason)
         if not np.any(request.velocity_mps) and not np.any(request.acceleration_mps2):
-            return SmoothResult(status=PlanStatus.OK, trajectory=stop_and_go(path_m, request.time_s, limits))
-        state = (request.position_m, request.velocity_mps, request.acceleration_mps2)
-        brake = braking_trajectory(request.time_s, *state, limits)
-        way = evaluate(brake, sample_times(brake, brake.start_s, _CHECK_S))[0]
-        blocked = shortfall(request, way, min_clearance_m, limits.max_acceleration_mps2, known_only)
+            return ShapedPath(status=PlanStatus.OK, trajectory=stop_and_go(path_m, request.time_s, limits))
+        brake, way, blocked = braking(request, constraints)
         if blocked:
-            return SmoothResult(status=PlanStatus.NOT_CLEAR, reason=f"braking: {blocked}")
-        ends = np.stack([way[-1], request.goal.position_m])
-        space = free_space(
-            request.field, ends, request.flight_bounds_m, min_clearance_m, math.inf, known_only
-        )
-        path = shortcut(np.concatenate([way[::-1], path_m[1:]]), space)
+            return ShapedPath(status=PlanStatus.NOT_CLEAR, reason=f"braking: {blocked}")
+        given = Given(standing(request, brake.end_s, way[-1]), path_m, None, constraints)
+        path = shortcut(np.concatenate([way[::-1], path_m[1:]]), space_of(given, 0.0))
         onward = stop_and_go(path, brake.end_s, limits)
-        return SmoothResult(status=PlanStatus.OK, trajectory=join(brake, onward), reason="brakes first")
+        return ShapedPath(status=PlanStatus.OK, trajectory=join(brake, onward), reason="brakes first")
 
 
 def stop_and_go(path_m: Float, start_s: float, limits: Limits) -> Trajectory:

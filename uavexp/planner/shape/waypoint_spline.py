@@ -20,7 +20,7 @@ from uavexp.parameters import option
 from uavexp.planner.constraints import Constraints
 from uavexp.planner.find.base import FoundPath
 from uavexp.planner.movers.moving import MovingObstacles
-from uavexp.planner.shape.base import ShapedPath, SmoothResult, shaped_by
+from uavexp.planner.shape.base import ShapedPath
 from uavexp.trajectory import Trajectory
 from uavexp.types import Limits, PlanRequest, PlanStatus
 
@@ -39,22 +39,10 @@ class WaypointSpline:
     ) -> ShapedPath:
         """Return a trajectory or the reason why there is none (`Shaper.shape`)."""
         del movers
-        return shaped_by(self.smooth, request, found, constraints)
-
-    def smooth(
-        self,
-        request: PlanRequest,
-        path_m: Float,
-        times_s: Float | None,
-        limits: Limits,
-        min_clearance_m: float,
-        known_only: bool,
-    ) -> SmoothResult:
-        """Return the spline through the path's corners, unchecked (`Smoother.smooth`)."""
-        del times_s, min_clearance_m, known_only
+        limits, path_m = constraints.limits, found.path_m
         if not (limits.max_speed_mps > 0.0 and limits.max_acceleration_mps2 > 0.0):
             reason = f"limits of {limits.max_speed_mps:g} m/s and {limits.max_acceleration_mps2:g} m/s²"
-            return SmoothResult(status=PlanStatus.LIMITS, reason=reason)
+            return ShapedPath(status=PlanStatus.LIMITS, reason=reason)
         apart = np.linalg.norm(np.diff(path_m, axis=0), axis=1) > _SHORTEST_M
         corners = np.concatenate([path_m[:1], path_m[1:][apart]])
         if len(corners) < 2:
@@ -66,7 +54,7 @@ class WaypointSpline:
             coefficients=np.ascontiguousarray(spline.c[::-1].transpose(1, 0, 2)),
             at_rest=True,
         )
-        return SmoothResult(status=PlanStatus.OK, trajectory=trajectory)
+        return ShapedPath(status=PlanStatus.OK, trajectory=trajectory)
 
 
 def passing_times_s(corners_m: Float, limits: Limits) -> Float:

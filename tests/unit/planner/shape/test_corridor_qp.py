@@ -10,21 +10,17 @@ import pytest
 from scipy.interpolate import BSpline
 from scipy.optimize import LinearConstraint, NonlinearConstraint, minimize
 
+from tests.shaped import shaped
 from uavexp.arrays import Bool, Float
 from uavexp.check.fields import bounds, box, empty, field_from
-from uavexp.errors import ConfigError
 from uavexp.field import DistanceField
 from uavexp.geometry import polyline_length_m
-from uavexp.planner.bspline_qp import BsplineQp
 from uavexp.planner.find.free_space import free_space
-from uavexp.planner.shape import make_smoother
-from uavexp.planner.shape.corridor import Corridor, make_corridor
-from uavexp.planner.shape.corridor_qp import BsplineSmoother, Derivative
-from uavexp.planner.shape.quadratic import NO_CUTS, Problem, solve
+from uavexp.planner.shape.cone_program import NO_CUTS, Problem, solve
+from uavexp.planner.shape.corridor_qp import CorridorQp, Derivative
+from uavexp.planner.shape.flight_corridor import Corridor, make_corridor
 from uavexp.planner.shape.shortcut import shortcut
-from uavexp.planner.shape.time_law import TimeLaw
 from uavexp.planner.shape.timing import resample
-from uavexp.planner.shape.waypoint_spline import WaypointSpline
 from uavexp.planner.spline.clamped import Basis, end_points, make_basis, to_trajectory
 from uavexp.trajectory import derivative, evaluate
 from uavexp.types import Goal, Limits, PlanRequest, PlanStatus
@@ -171,7 +167,7 @@ def test_keeps_limits_corridor_and_length(kind: Derivative) -> None:
     grid, field, way = hall()
     start = np.array([1.5, 0.2, 0.0])
     request = ask(field, grid, way[0], way[-1], velocity=start)
-    result = BsplineSmoother(derivative=kind).smooth(request, way, None, LIMITS, 0.26, False)
+    result = shaped(CorridorQp(derivative=kind), request, way, LIMITS)
     assert result.trajectory is not None, result.reason
     times = np.append(np.arange(5.0, result.trajectory.end_s, 1e-3), result.trajectory.end_s)
     position, velocity, acceleration = evaluate(result.trajectory, times)
@@ -213,7 +209,7 @@ def test_times_of_a_dynamic_planner_set_the_duration() -> None:
     field, way = field_from(grid), np.linspace([1.0, 2.0, 1.0], [7.0, 2.0, 1.0], 20)
     request = ask(field, grid, way[0], way[-1])
     share = np.linspace(0.0, 1.0, 20)
-    slow = BsplineSmoother(duration_margin=1.0).smooth(request, way, 9.0 * share, LIMITS, 0.26, False)
+    slow = shaped(CorridorQp(duration_margin=1.0), request, way, LIMITS, 9.0 * share)
     assert slow.trajectory is not None
     assert slow.trajectory.duration_s == pytest.approx(9.0)
 
@@ -221,12 +217,12 @@ def test_times_of_a_dynamic_planner_set_the_duration() -> None:
 def test_a_moving_end_can_be_stopped_from() -> None:
     grid = empty((12.0, 4.0, 2.0))
     box(grid, (8.0, 0.0, 0.0), (8.5, 4.0, 2.0))
-    field, smoother = field_from(grid), BsplineSmoother(end_speed_mps=2.0)
+    field, shaper = field_from(grid), CorridorQp(end_speed_mps=2.0)
     speeds = []
     for goal_x in (4.0, 7.6):
         way = np.array([[1.0, 2.0, 1.0], [goal_x, 2.0, 1.0]])
         request = ask(field, grid, way[0], way[-1], target=False)
-        flown = smoother.smooth(request, way, None, LIMITS, 0.26, False).trajectory
+        flown = shaped(shaper, request, way, LIMITS).trajectory
         assert flown is not None
         assert not flown.at_rest
         speeds.append(float(np.linalg.norm(evaluate(flown, np.array([flown.end_s]))[1])))
@@ -239,12 +235,12 @@ def test_a_start_towards_a_wall_is_braked_first() -> None:
     field = field_from(grid)
     way = np.array([[1.5, 2.0, 1.0], [0.5, 2.0, 1.0]])
     request = ask(field, grid, way[0], way[1], velocity=np.array([2.5, 0.0, 0.0]))
-    result = BsplineSmoother().smooth(request, way, None, LIMITS, 0.26, False)
+    result = shaped(CorridorQp(), request, way, LIMITS)
     assert result.trajectory is not None
     position = evaluate(result.trajectory, np.arange(5.0, result.trajectory.end_s, 1e-3))[0]
     assert 0.5 < position[:, 0].max() - 1.5 < 2.2
     late = dataclasses.replace(request, position_m=np.array([3.2, 2.0, 1.0]))
-    refused = BsplineSmoother().smooth(late, np.array([late.position_m, way[1]]), None, LIMITS, 0.26, False)
+    refused = shaped(CorridorQp(), late, np.array([late.position_m, way[1]]), LIMITS)
     assert refused.status is PlanStatus.NOT_CLEAR
     assert "braking" in refused.reason
 
@@ -271,24 +267,13 @@ def test_bad_input_has_a_status(change: dict[str, Any], status: PlanStatus) -> N
         box(grid, (2.5, 0.0, 0.0), (3.5, 1.0 - 0.5 * change["gap"], 2.0))
         box(grid, (2.5, 1.0 + 0.5 * change["gap"], 0.0), (3.5, 2.0, 2.0))
     request = ask(field_from(grid), grid, start, goal, velocity=change.get("velocity"))
-    result = BsplineSmoother().smooth(
+    result = shaped(
+        CorridorQp(),
         request,
         change.get("path", np.stack([start, goal])),
-        change.get("times"),
         change.get("limits", LIMITS),
-        0.26,
-        False,
+        change.get("times"),
     )
     assert result.status is status
     assert (result.trajectory is not None) == (status is PlanStatus.OK)
     assert result.reason or status is PlanStatus.OK
-
-
-def test_smoothers_by_name() -> None:
-    assert make_smoother("bspline_qp", "snap") == BsplineSmoother(derivative=Derivative.SNAP)
-    assert make_smoother("none") == TimeLaw()
-    assert make_smoother("waypoint_spline") == WaypointSpline()
-    with pytest.raises(ConfigError, match=r"smoothing must be .* waypoint_spline, got 'spline'"):
-        make_smoother("spline")
-    with pytest.raises(ConfigError, match=r"derivative must be acceleration \| jerk \| snap, got 'crackle'"):
-        BsplineQp(derivative="crackle")  # type: ignore[arg-type]

@@ -14,6 +14,7 @@ from uavexp.errors import ConfigError
 from uavexp.field import DistanceField
 from uavexp.geometry import polyline_length_m
 from uavexp.planner.min_acc import MinAcc
+from uavexp.planner.shape.scp import Scp
 from uavexp.planner.spline.cubic import segment_model
 from uavexp.planner.spline.uniform import power_matrix
 from uavexp.trajectory import Trajectory, evaluate
@@ -25,7 +26,8 @@ LIMITS = Limits(
 
 
 def planner(limits: Limits = LIMITS, **changes: float | str) -> MinAcc:
-    made = MinAcc(**changes)  # type: ignore[arg-type]
+    shaped = {name: changes.pop(name) for name in list(changes) if hasattr(Scp(), name)}
+    made = MinAcc(shape=Scp(**shaped), **changes)  # type: ignore[arg-type]
     made.reset(limits, np.random.default_rng(0))
     return made
 
@@ -247,10 +249,9 @@ def test_conservative_plans_stay_in_known_space() -> None:
         ("final_iterations", 2.5),
         ("tolerance", 0.0),
         ("unknown", "brave"),
-        ("max_expansions", -1),
         ("z_band_m", -0.1),
     ],
 )
 def test_bad_parameters_are_named(name: str, value: float | str) -> None:
     with pytest.raises(ConfigError, match=name):
-        MinAcc(**{name: value})  # type: ignore[arg-type]
+        planner(**{name: value})

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.shaped import shaped
 from tests.unit.trigger.test_trigger import LIMITS
 from uavexp.planner.shape.waypoint_spline import WaypointSpline, passing_times_s
 from uavexp.trajectory import evaluate, sample_times
@@ -27,7 +28,7 @@ def request(path: np.ndarray) -> PlanRequest:
 
 
 def spline(path: np.ndarray):
-    result = WaypointSpline().smooth(request(path), path, None, LIMITS, 0.3, False)
+    result = shaped(WaypointSpline(), request(path), path, LIMITS)
     assert result.status is PlanStatus.OK
     assert result.trajectory is not None
     return result.trajectory

@@ -16,7 +16,7 @@ from uavexp.check.requests import ask
 from uavexp.planner.constraints import Constraints
 from uavexp.planner.find.free_space import free_space, straight_is_free
 from uavexp.planner.find.grid import Grid
-from uavexp.planner.shape.corridor import Corridor, make_corridor
+from uavexp.planner.shape.flight_corridor import Corridor, make_corridor
 from uavexp.planner.shape.shortcut import shortcut
 from uavexp.planner.shape.timing import resample
 

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uavexp.arrays import Float, Int
-from uavexp.planner.shape.corridor import Corridor
+from uavexp.planner.shape.flight_corridor import Corridor
 from uavexp.planner.shape.qp import INFEASIBLE, solve_qp
 from uavexp.planner.spline.clamped import Basis, end_points
 
@@ -60,15 +60,6 @@ class Solution(NamedTuple):
     cuts: Cuts
     solves: int  # QPs
     reason: str  # "corridor", "limits" or "solver"; empty with a control
-
-
-class Rows(NamedTuple):
-    """Rows of the corridor: rows @ (control points - guess) <= sides."""
-
-    span_point: Float  # (R, N) weights of the control points
-    normal: Float  # (R, 3)
-    side: Float  # (R,)
-    near: Float  # (R,) distance of the face from the guess, m
 
 
 def solve(problem: Problem, h: float, cuts: Cuts, rounds: int) -> Solution:
