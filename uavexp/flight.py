@@ -75,11 +75,13 @@ def fly_cell(cell: Cell, seed: int, progress: Progress | None = None) -> Trial:
     Raises:
         UavexpError: something the user can mend (the world cannot be made, no such device).
     """
+    from uavexp.config.own_metrics import own_metrics
     from uavexp.metrics.evaluate import evaluate
     from uavexp.trial import fly_trial
 
     world, log = fly_trial(build(cell.config), seed, progress)
-    return Trial(cell=cell, seed=seed, world=world, log=log, metrics=evaluate(log, world))
+    metrics = evaluate(log, world, own_metrics(cell.metrics))
+    return Trial(cell=cell, seed=seed, world=world, log=log, metrics=metrics)
 
 
 def check_world(cell: Cell, seed: int) -> None:

@@ -19,6 +19,7 @@ from uavexp.config.experiment import Experiment, LabelledCell, expand, list_expe
 from uavexp.config.interpolation import resolved
 from uavexp.config.options import EXPERIMENT_GROUP, PRESET_GROUP, RUNNER_GROUP, list_options, read_option
 from uavexp.config.overrides import Setting, expand_grid, expand_seeds, render
+from uavexp.config.own_metrics import modules_of
 from uavexp.config.trees import CONFIG_NAME, TRIGGER_GROUP, Trees
 from uavexp.config.trust import check_trust
 from uavexp.errors import ConfigError
@@ -39,6 +40,7 @@ class Cell:
     config: dict[str, Any]  # plain, resolved, checked: groups and the keys of no group
     settings: tuple[Setting, ...]  # what was typed for it, or stands in the experiment's file
     labels: dict[str, str]  # axis -> its value for this cell
+    metrics: tuple[str, ...] = ()  # modules of one's own metrics: no part of what is flown
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,7 +121,7 @@ class Composer:
             )
         experiment = read_experiment(name, self.experiments[name])
         for axis in experiment.axes:
-            if axis in (*GROUPS, *top_level(), PRESET_GROUP, RUNNER_GROUP, "seed", "out"):
+            if axis in (*GROUPS, *top_level(), PRESET_GROUP, RUNNER_GROUP, "metrics", "seed", "out"):
                 raise ConfigError(f"experiments={name}: an axis may not be called like the key {axis}")
         return experiment
 
@@ -158,6 +160,7 @@ class Composer:
             config=config,
             settings=tuple(settings),
             labels=dict(labels or {}),
+            metrics=modules_of(tree["metrics"]),
         )
 
     def _refuse_stray_keys(self, tree: Mapping[str, Any], choices: Mapping[str, str]) -> None:

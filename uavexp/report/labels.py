@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from uavexp.config.own_metrics import own_metrics
 from uavexp.errors import ConfigError
 from uavexp.metrics.evaluate import METRICS, metric_of
 from uavexp.metrics.metric import SUCCESS, Metric
@@ -57,13 +58,21 @@ def with_own_causes(metrics: Sequence[Metric], columns: Iterable[str]) -> list[M
 def metrics_of(names: Iterable[str]) -> tuple[Metric, ...]:
     """The metrics of these names in their order; `causes` stands for a metric per cause.
 
+    One's own are named with their module: `my_package.turning.turn_time_s`.
+
     Raises:
         ConfigError: one is unknown.
     """
     found: list[Metric] = []
     for name in names:
-        if name != ALL_CAUSES and name not in _BY_COLUMN:
-            known = ", ".join(sorted((*_BY_COLUMN, ALL_CAUSES)))
-            raise ConfigError(f"no such metric: {name}{nearest(name, _BY_COLUMN)}; there are {known}")
-        found += CAUSE_METRICS if name == ALL_CAUSES else (_BY_COLUMN[name],)
+        found += CAUSE_METRICS if name == ALL_CAUSES else (_metric(name),)
     return tuple(found)
+
+
+def _metric(name: str) -> Metric:
+    module, _, column = name.rpartition(".")
+    known = {metric.column: metric for metric in own_metrics([module])} if module else _BY_COLUMN
+    if column not in known:
+        names = ", ".join(sorted((*known, *([] if module else [ALL_CAUSES]))))
+        raise ConfigError(f"no such metric: {name}{nearest(column, known)}; there are {names}")
+    return known[column]

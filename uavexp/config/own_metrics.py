@@ -1,0 +1,53 @@
+"""Metrics of one's own: `metrics=my_package.turning` names a module whose `METRICS` join the columns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib import import_module
+from typing import Any
+
+from uavexp.config.trust import VARIABLE, is_trusted
+from uavexp.errors import ConfigError
+from uavexp.metrics.metric import Measure, Metric, Metrics
+
+
+def modules_of(value: Any) -> tuple[str, ...]:
+    """The modules that the key names: none, one or a list; each is loaded and looked at.
+
+    Raises:
+        ConfigError: as `own_metrics` does.
+    """
+    modules = () if value is None else (value,) if isinstance(value, str) else tuple(map(str, value))
+    own_metrics(modules)
+    return modules
+
+
+def own_metrics(modules: Sequence[str]) -> Metrics:
+    """What modules declare as `METRICS`, as the files of `uavexp.metrics` do.
+
+    Raises:
+        ConfigError: one is not trusted, cannot be imported, declares none, or a column is taken.
+    """
+    if not modules:
+        return {}
+    from uavexp.metrics.evaluate import METRICS
+
+    found: dict[Metric, Measure] = {}
+    for module in modules:
+        for metric, measure in _declared(module).items():
+            if metric.column in {other.column for other in (*METRICS, *found)}:
+                raise ConfigError(f"metrics={module}: the column {metric.column} is taken")
+            found[metric] = measure
+    return found
+
+
+def _declared(module: str) -> Metrics:
+    if not is_trusted(f"{module}.METRICS"):
+        raise ConfigError(f"metrics={module} is refused: add its package to the variable {VARIABLE}")
+    try:
+        metrics: Metrics = import_module(module).METRICS
+    except ImportError as error:
+        raise ConfigError(f"metrics={module} cannot be imported: {error}") from error
+    except AttributeError as error:
+        raise ConfigError(f"metrics={module} declares no METRICS, {{Metric(...): measure}}") from error
+    return metrics
