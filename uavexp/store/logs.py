@@ -20,7 +20,6 @@ import numpy.typing as npt
 
 from uavexp.errors import RecordError
 from uavexp.log import Contact, Replan, TrialLog
-from uavexp.store.records import write_bytes
 from uavexp.types import Outcome, PlanStatus
 
 Arrays = dict[str, npt.NDArray[Any]]
@@ -119,11 +118,6 @@ def check_packed(path: Path) -> None:
         raise RecordError(f"{path}: damaged ({error})") from error
     if bad is not None:
         raise RecordError(f"{path}: damaged ({bad})")
-
-
-def write_log(path: Path, arrays: Mapping[str, npt.NDArray[Any]]) -> None:
-    """Write the arrays of a log atomically; equal logs give equal bytes."""
-    write_bytes(path, pack(arrays))
 
 
 def read_log(path: Path) -> TrialLog:

@@ -10,7 +10,6 @@ import numpy as np
 
 from uavexp.errors import RecordError
 from uavexp.store.logs import check_packed, pack, unpack
-from uavexp.store.records import write_bytes
 from uavexp.types import Difficulty, Surface, World
 
 
@@ -34,15 +33,6 @@ def is_whole(path: Path) -> bool:
     except RecordError:
         return False
     return True
-
-
-def write_world(path: Path, world: World) -> None:
-    """Write a world atomically.
-
-    Raises:
-        RecordError: it cannot be written.
-    """
-    write_bytes(path, world_bytes(world))
 
 
 def read_world(path: Path) -> World:

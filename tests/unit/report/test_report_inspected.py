@@ -12,10 +12,10 @@ from tests.logs import make_log, make_world, still_curve
 from tests.studies import made_up
 from uavexp.log import TrialLog
 from uavexp.report.contents import Report
-from uavexp.store.logs import log_arrays, write_log
+from uavexp.store.logs import log_arrays, pack
 from uavexp.store.records import LOG
 from uavexp.store.study import TRIALS, WORLDS, Study
-from uavexp.store.worlds import write_world
+from uavexp.store.worlds import world_bytes
 
 ARMS = ("static", "both")
 CELLS = 40
@@ -60,10 +60,10 @@ def study_of(folder: Path, kinds: tuple[str, str] = ARMS) -> Study:
     settings = {"primary": "static", "metrics": ["coverage_visible"]}
     study = made_up(folder, pd.DataFrame(rows), {"arm": ARMS}, report=report, settings=settings)
     (folder / WORLDS).mkdir()
-    write_world(folder / WORLDS / "w.npz", make_world([([3.0, 3.0, 0.0], [4.0, 4.0, 2.0])]))
+    (folder / WORLDS / "w.npz").write_bytes(world_bytes(make_world([([3.0, 3.0, 0.0], [4.0, 4.0, 2.0])])))
     for arm, share in zip(ARMS, (1.0, 0.5), strict=True):
         (folder / TRIALS / f"{arm}-3").mkdir(parents=True)
-        write_log(folder / TRIALS / f"{arm}-3" / LOG, log_arrays(flight(share)))
+        (folder / TRIALS / f"{arm}-3" / LOG).write_bytes(pack(log_arrays(flight(share))))
     return study
 
 

@@ -17,7 +17,7 @@ from pyarrow import parquet
 from tests.logs import make_log, make_replan, still_curve
 from uavexp.errors import RecordError
 from uavexp.log import Contact, Replan, TrialLog
-from uavexp.store.logs import arrays_digest, flat, log_arrays, nested, read_log, write_log
+from uavexp.store.logs import arrays_digest, flat, log_arrays, nested, pack, read_log
 from uavexp.store.records import (
     canonical_json,
     cell_digest,
@@ -31,7 +31,7 @@ from uavexp.store.records import (
 )
 from uavexp.store.study import Study, StudyCell, collect, read_study, study_text
 from uavexp.store.table import FIRST, replan_rows, row_of, write_table
-from uavexp.store.worlds import read_world, world_bytes, write_world
+from uavexp.store.worlds import read_world, world_bytes
 from uavexp.types import Outcome, PlanStatus, World
 from uavexp.world.random_columns import RandomColumns
 
@@ -178,7 +178,7 @@ def test_a_written_file_is_as_readable_as_any_other(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("rows", "replans", "contacts"), [(5, 3, 1), (1, 0, 0), (0, 1, 2)])
 def test_a_log_comes_back_as_it_was(tmp_path: Path, rows: int, replans: int, contacts: int) -> None:
     log = flight(rows, replans, contacts)
-    write_log(tmp_path / "log.npz", log_arrays(log))
+    (tmp_path / "log.npz").write_bytes(pack(log_arrays(log)))
     back = read_log(tmp_path / "log.npz")
     assert arrays_digest(log_arrays(back)) == arrays_digest(log_arrays(log))
     written, read = flat(log), flat(back)
@@ -193,12 +193,12 @@ def test_a_log_comes_back_as_it_was(tmp_path: Path, rows: int, replans: int, con
 
 def test_equal_logs_give_equal_bytes(tmp_path: Path) -> None:
     for name in ("a.npz", "b.npz"):
-        write_log(tmp_path / name, log_arrays(flight()))
+        (tmp_path / name).write_bytes(pack(log_arrays(flight())))
     assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
 
 
 def test_a_flipped_bit_in_a_log_is_refused(tmp_path: Path) -> None:
-    write_log(tmp_path / "log.npz", log_arrays(flight(200)))
+    (tmp_path / "log.npz").write_bytes(pack(log_arrays(flight(200))))
     data = bytearray((tmp_path / "log.npz").read_bytes())
     data[len(data) // 3] ^= 1
     (tmp_path / "log.npz").write_bytes(data)
@@ -330,7 +330,7 @@ def test_a_delay_that_a_record_does_not_tell_comes_from_its_log(tmp_path: Path) 
     (tmp_path / "study.json").write_text(study_text(study))
     collect(tmp_path)
     assert read_study(tmp_path).replans["delay_s"].isna().all()  # no log either
-    write_log(trial / "log.npz", log_arrays(log))
+    (trial / "log.npz").write_bytes(pack(log_arrays(log)))
     collect(tmp_path)
     replans = read_study(tmp_path).replans
     assert replans["blocked_since_s"].tolist() == pytest.approx([math.nan, 2.0], nan_ok=True)
@@ -339,7 +339,7 @@ def test_a_delay_that_a_record_does_not_tell_comes_from_its_log(tmp_path: Path) 
 
 def test_a_world_comes_back_as_it_was_and_equal_worlds_give_equal_bytes(tmp_path: Path) -> None:
     world = RandomColumns(size_m=(8.0, 6.0, 3.0)).generate(np.random.default_rng(1))
-    write_world(tmp_path / "world.npz", world)
+    (tmp_path / "world.npz").write_bytes(world_bytes(world))
     back = read_world(tmp_path / "world.npz")
     for item in dataclasses.fields(World):
         given, got = getattr(world, item.name), getattr(back, item.name)
