@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -137,31 +137,36 @@ def _claims(claims: Sequence[Judgement]) -> str:
     counts = ", ".join(
         f"{sum(claim.verdict is verdict for claim in claims)} {verdict}" for verdict in Verdict
     )
-    rows = "\n".join(
+    rows = (
         f'<tr class="{claim.verdict.replace(" ", "-")}"><td>{escape(claim.statement)}</td>'
         f"<td>{escape(claim.source)}</td>"
         f'<td class="verdict">{_MARKS[claim.verdict]} {escape(claim.verdict)}</td>'
         f"<td>{escape(claim.evidence)}</td></tr>"
         for claim in claims
     )
-    return (
-        f"<p>{counts}.</p>\n"
-        '<div class="wide"><table class="claims"><thead><tr><th>claim</th><th>source</th><th>verdict</th>'
-        f"<th>evidence</th></tr></thead>\n<tbody>\n{rows}\n</tbody></table></div>"
-    )
+    head = ("claim", "source", "verdict", "evidence")
+    return f"<p>{counts}.</p>\n" + _grid(head, rows, table_class=' class="claims"')
 
 
 def _table(table: Table) -> str:
-    head = "".join(f"<th>{escape(column)}</th>" for column in table.columns)
-    rows = "\n".join(
-        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in table.rows
-    )
     notes = "".join(f"<li>{escape(note)}</li>" for note in table.notes)
     return (
         f'<h3 id="table-{escape(table.name)}">{escape(table.title)}</h3>\n'
-        f'<div class="wide"><table><thead><tr>{head}</tr></thead>\n<tbody>\n{rows}\n</tbody></table></div>\n'
-        + (f'<ul class="notes">{notes}</ul>' if notes else "")
+        + _grid(table.columns, (_row(map(escape, row)) for row in table.rows))
+        + (f'\n<ul class="notes">{notes}</ul>' if notes else "\n")
     )
+
+
+def _grid(head: Iterable[str], rows: Iterable[str], *, size: str = "wide", table_class: str = "") -> str:
+    columns, body = "".join(f"<th>{escape(column)}</th>" for column in head), "\n".join(rows)
+    return (
+        f'<div class="{size}"><table{table_class}><thead><tr>{columns}</tr></thead>\n'
+        f"<tbody>\n{body}\n</tbody></table></div>"
+    )
+
+
+def _row(cells: Iterable[str]) -> str:
+    return "<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
 
 
 def _figure(drawing: Drawing, png: Path) -> str:
@@ -188,15 +193,13 @@ def _failed(results: Results) -> str:
     failed = flights[~flights["success"].astype(bool)]
     if failed.empty:
         return "<p>Every trial succeeded.</p>"
-    rows = "\n".join(_failed_row(study, row) for row in failed.head(MOST_FAILED).to_dict("records"))
     rest = len(failed) - MOST_FAILED
     more = f" The first {MOST_FAILED} are shown, {rest} more are in {TABLE}." if rest > 0 else ""
+    head = ("arm", "scene", "seed", "outcome", "contacts", "picture", "command that repeats it")
+    rows = (_failed_row(study, row) for row in failed.head(MOST_FAILED).to_dict("records"))
     return (
         f"<p>{len(failed)} of {len(flights)} trials did not reach their target without contact.{more} "
-        "Where no picture is kept, the command makes it.</p>\n"
-        '<div class="wide tall"><table><thead><tr><th>arm</th><th>scene</th><th>seed</th><th>outcome</th>'
-        "<th>contacts</th><th>picture</th><th>command that repeats it</th></tr></thead>\n"
-        f"<tbody>\n{rows}\n</tbody></table></div>"
+        "Where no picture is kept, the command makes it.</p>\n" + _grid(head, rows, size="wide tall")
     )
 
 
@@ -214,7 +217,7 @@ def _failed_row(study: Study, row: Mapping[Any, Any]) -> str:
         link,
         _code(command) if command else "–",
     )
-    return "<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
+    return _row(cells)
 
 
 def _ending(row: Mapping[Any, Any]) -> Iterator[str]:

@@ -15,7 +15,6 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from uavexp.causes import cause_named
 from uavexp.log import TrialLog
 from uavexp.metrics import replanning
 from uavexp.report import inspection_view, movers_view, plan_view, replan_marks, style
@@ -92,13 +91,10 @@ def _draw_clearance(axes: Axes, log: TrialLog, safety_threshold_m: float, near_m
     axes.plot(ticks.tick_s, ticks.esdf_clearance_m, color=style.ORANGE, lw=1.0, label="in the map (ESDF)")
     axes.plot(time_s, clearance_m, color=style.BLUE, lw=1.3, label="true")
     if math.isfinite(safety_threshold_m):
-        axes.axhline(
-            safety_threshold_m, color=style.BLACK, lw=0.8, ls=(0, (4, 2)), label=f"{safety_threshold_m:g} m"
-        )
-        below = clearance_m < safety_threshold_m
-        axes.fill_between(
-            time_s, clearance_m, safety_threshold_m, where=below, color=style.VERMILLION, alpha=0.45, lw=0
-        )
+        limit_m = safety_threshold_m
+        axes.axhline(limit_m, color=style.BLACK, lw=0.8, ls=(0, (4, 2)), label=f"{limit_m:g} m")
+        below: dict[str, Any] = {"where": clearance_m < limit_m, "color": style.VERMILLION, "alpha": 0.45}
+        axes.fill_between(time_s, clearance_m, limit_m, lw=0, **below)
     for contact in log.contacts:
         axes.axvspan(contact.start_s, contact.end_s, color=style.VERMILLION, alpha=0.25, lw=0)
         axes.plot(contact.start_s, 0.0, clip_on=False, **style.contact_marker(contact.mover >= 0, 7.0))
@@ -115,12 +111,9 @@ def _draw_tracking(axes: Axes, log: TrialLog) -> None:
     error_m = np.linalg.norm(log.steps.position_m - log.steps.reference_position_m, axis=-1)
     axes.plot(log.steps.time_s[::stride], error_m[::stride], color=style.BLUE, lw=1.1)
     size_pt = plan_view.marker_size_pt(log) - 1.5
-    top: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "clip_on": False, "zorder": 5}
     for replan in replanning.failed(log):
-        axes.plot(replan.time_s, 1.0, **replan_marks.failed_marker(replan.cause, size_pt), **top)
-    for replan in replanning.executed(log):
-        axes.axvline(replan.time_s, color=cause_named(replan.cause).colour, lw=0.7, alpha=0.8, zorder=1)
-        axes.plot(replan.time_s, 1.0, **replan_marks.marker(replan.cause, size_pt), **top)
+        replan_marks.draw_above(axes, replan.time_s, replan_marks.failed_marker(replan.cause, size_pt))
+    replan_marks.draw_replans(axes, log, size_pt)
     axes.set_ylim(bottom=0.0)
     axes.set(xlabel="time [s]", ylabel="tracking error [m]")
     _finish_panel(axes, log, legend=False)
@@ -180,15 +173,8 @@ def _event_handles(log: TrialLog) -> list[Line2D]:
         for cause, count in taken.items()
     ]
     if failed:
-        hollow: dict[str, Any] = {
-            "marker": "o",
-            "ls": "",
-            "mfc": "white",
-            "mec": "#606060",
-            "mew": 1.2,
-            "ms": 6.5,
-        }
-        handles.append(Line2D([], [], label=f"hollow: no plan found ({failed})", **hollow))
+        hollow: dict[str, Any] = {"marker": "o", "mfc": "white", "mec": "#606060", "mew": 1.2, "ms": 6.5}
+        handles.append(Line2D([], [], ls="", label=f"hollow: no plan found ({failed})", **hollow))
     return [*handles, *plan_view.contact_handles(log)]
 
 
@@ -210,15 +196,8 @@ def _draw_header(sheet: Page, world: World, log: TrialLog, metrics: Values, titl
     sheet.figure.text(left, 1.0 - 0.43 / height_in, numbers, fontsize=size, va="center")
     command = textwrap.shorten(title, 170, placeholder=" …")
     size = min(8.0, 8.0 * 150 / max(len(command), 1))
-    sheet.figure.text(
-        left,
-        1.0 - 0.59 / height_in,
-        command,
-        fontsize=size,
-        family="DejaVu Sans Mono",
-        color="#505050",
-        va="center",
-    )
+    look: dict[str, Any] = {"fontsize": size, "family": "DejaVu Sans Mono", "color": "#505050"}
+    sheet.figure.text(left, 1.0 - 0.59 / height_in, command, va="center", **look)
 
 
 def _key_numbers(metrics: Values) -> str:

@@ -18,6 +18,7 @@ LEGEND_ROW_IN = 0.16
 PLAN_HEIGHT_IN = (2.2, 6.6)  # least and greatest
 SIDE_PLAN_HEIGHT_IN, SIDE_PLAN_WIDTH_IN = 7.0, 5.6
 COLUMN_GAP_IN = 0.75
+BAR_IN = 1.7
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,23 +50,21 @@ def lay_out(size_m: tuple[float, float], mover_entries: int = 0) -> Page:
 def _below(aspect: float, mover_entries: int) -> Page:
     width = WIDTH_IN - LEFT_IN - RIGHT_IN
     plan = min(max(width * aspect, PLAN_HEIGHT_IN[0]), PLAN_HEIGHT_IN[1])
-    tracking_y = BOTTOM_IN
-    clearance_y = tracking_y + PANEL_IN + PANEL_GAP_IN
+    clearance_y = BOTTOM_IN + PANEL_IN + PANEL_GAP_IN
     legend_y = clearance_y + PANEL_IN + 0.3
     legend_top = legend_y + LEGEND_IN
     movers_top = legend_top + LEGEND_ROW_IN * -(-mover_entries // 5)
     plan_y = movers_top + AXIS_LABEL_IN
     figure = Figure(figsize=(WIDTH_IN, plan_y + plan + HEADER_IN))
-    bar_width = 1.7
-    return _page(
-        figure,
-        plan=(LEFT_IN, plan_y, width, plan),
-        clearance=(LEFT_IN, clearance_y, width, PANEL_IN),
-        tracking=(LEFT_IN, tracking_y, width, PANEL_IN),
-        speed_bar=(WIDTH_IN - RIGHT_IN - bar_width, legend_y + 0.4, bar_width, 0.1),
-        legend=(LEFT_IN - 0.1, legend_top),
-        columns=6,
-        movers_legend=(LEFT_IN - 0.1, movers_top),
+    return Page(
+        figure=figure,
+        plan=_axes(figure, LEFT_IN, plan_y, width, plan),
+        clearance=_axes(figure, LEFT_IN, clearance_y, width, PANEL_IN),
+        tracking=_axes(figure, LEFT_IN, BOTTOM_IN, width, PANEL_IN),
+        speed_bar=_axes(figure, WIDTH_IN - RIGHT_IN - BAR_IN, legend_y + 0.4, BAR_IN, 0.1),
+        legend_corner=_corner(figure, LEFT_IN - 0.1, legend_top),
+        legend_columns=6,
+        movers_corner=_corner(figure, LEFT_IN - 0.1, movers_top),
         movers_columns=5,
     )
 
@@ -77,49 +76,26 @@ def _beside(aspect: float, mover_entries: int) -> Page:
     movers = LEGEND_ROW_IN * -(-mover_entries // 2)
     panel = 2.2 - 0.5 * movers
     clearance_y = BOTTOM_IN + panel + PANEL_GAP_IN
-    figure = Figure(figsize=(WIDTH_IN, BOTTOM_IN + SIDE_PLAN_HEIGHT_IN + HEADER_IN))
     top = BOTTOM_IN + SIDE_PLAN_HEIGHT_IN
-    return _page(
-        figure,
-        plan=(LEFT_IN, BOTTOM_IN, plan_width, SIDE_PLAN_HEIGHT_IN),
-        clearance=(x, clearance_y, width, panel),
-        tracking=(x, BOTTOM_IN, width, panel),
-        speed_bar=(x + 0.05, clearance_y + panel + 0.7, 1.7, 0.1),
-        legend=(x - 0.1, top - 0.05 - movers),
-        columns=2,
-        movers_legend=(x - 0.1, top - 0.05),
+    figure = Figure(figsize=(WIDTH_IN, top + HEADER_IN))
+    return Page(
+        figure=figure,
+        plan=_axes(figure, LEFT_IN, BOTTOM_IN, plan_width, SIDE_PLAN_HEIGHT_IN),
+        clearance=_axes(figure, x, clearance_y, width, panel),
+        tracking=_axes(figure, x, BOTTOM_IN, width, panel),
+        speed_bar=_axes(figure, x + 0.05, clearance_y + panel + 0.7, BAR_IN, 0.1),
+        legend_corner=_corner(figure, x - 0.1, top - 0.05 - movers),
+        legend_columns=2,
+        movers_corner=_corner(figure, x - 0.1, top - 0.05),
         movers_columns=2,
     )
 
 
-_Box = tuple[float, float, float, float]
+def _axes(figure: Figure, x: float, y: float, width: float, height: float) -> Axes:
+    across, up = figure.get_size_inches()
+    return figure.add_axes((x / across, y / up, width / across, height / up))
 
 
-def _page(
-    figure: Figure,
-    *,
-    plan: _Box,
-    clearance: _Box,
-    tracking: _Box,
-    speed_bar: _Box,
-    legend: tuple[float, float],
-    columns: int,
-    movers_legend: tuple[float, float],
-    movers_columns: int,
-) -> Page:
-    width, height = figure.get_size_inches()
-
-    def add(box: _Box) -> Axes:
-        return figure.add_axes((box[0] / width, box[1] / height, box[2] / width, box[3] / height))
-
-    return Page(
-        figure=figure,
-        plan=add(plan),
-        clearance=add(clearance),
-        tracking=add(tracking),
-        speed_bar=add(speed_bar),
-        legend_corner=(legend[0] / width, legend[1] / height),
-        legend_columns=columns,
-        movers_corner=(movers_legend[0] / width, movers_legend[1] / height),
-        movers_columns=movers_columns,
-    )
+def _corner(figure: Figure, x: float, y: float) -> tuple[float, float]:
+    across, up = figure.get_size_inches()
+    return x / across, y / up

@@ -29,11 +29,14 @@ def failed_marker(cause: str, size_pt: float) -> dict[str, Any]:
 
 def draw_replans(axes: Axes, log: TrialLog, size_pt: float) -> None:
     """Mark the replans that took effect along the upper edge, by cause."""
-    top: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "clip_on": False, "zorder": 5}
     for replan in replanning.executed(log):
-        look = cause_named(replan.cause)
-        axes.axvline(replan.time_s, color=look.colour, lw=0.6, alpha=0.7, zorder=1)
-        axes.plot(replan.time_s, 1.0, **marker(replan.cause, size_pt), **top)
+        axes.axvline(replan.time_s, color=cause_named(replan.cause).colour, lw=0.6, alpha=0.7, zorder=1)
+        draw_above(axes, replan.time_s, marker(replan.cause, size_pt))
+
+
+def draw_above(axes: Axes, time_s: float, look: dict[str, Any]) -> None:
+    """Draw a marker on the upper edge."""
+    axes.plot(time_s, 1.0, transform=axes.get_xaxis_transform(), clip_on=False, zorder=5, **look)
 
 
 def causes_in_words(logs: Iterable[TrialLog]) -> str:

@@ -12,6 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from uavexp.metrics.metric import Metric
+from uavexp.report.comparison import Panel, estimate
 from uavexp.report.printed import Reference
 
 if TYPE_CHECKING:
@@ -79,3 +80,15 @@ def paper(reference: Reference, metric: Metric) -> str:
     return (
         " Hollow diamonds: the paper's means." if any(name == metric.column for name, _ in reference) else ""
     )
+
+
+def draw_estimate(axes: Axes, panel: Panel, metric: Metric, arm: str, **point: Any) -> None:
+    """Draw mean and interval in the row of an arm; the trials with a value, where fewer than all."""
+    found, place = estimate(panel, metric, arm), panel.arms.index(arm)
+    if not found.n:
+        return
+    axes.plot(found.interval, (place, place), color=point["color"], lw=1.2, zorder=2)
+    axes.plot(found.mean, place, zorder=3, clip_on=False, **point)
+    if found.n < panel.n(arm):
+        at: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "fontsize": SMALL_PT}
+        axes.annotate(str(found.n), (found.mean, place), (0, 4), **at)

@@ -8,14 +8,13 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from uavexp.metrics.metric import Metric
-from uavexp.report.comparison import Panel, estimate
 from uavexp.report.figures import base
 from uavexp.report.figures.base import Drawing
-from uavexp.report.looks import Look, looks_of
+from uavexp.report.looks import looks_of
 from uavexp.report.results import Results
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+    pass
 
 _ACROSS = 4  # panels in a row
 _LABEL = 22  # characters in a line below a panel
@@ -31,7 +30,7 @@ def figure(results: Results, *, name: str, metrics: Sequence[Metric]) -> Drawing
     grid = drawn.subplots(down, across, sharey=True, squeeze=False).ravel()
     for axes, metric in zip(grid, there, strict=False):
         for place, arm in enumerate(panel.arms):
-            _draw(axes, panel, metric, arm, place, looks[arm])
+            base.draw_estimate(axes, panel, metric, arm, ms=5.0, **looks[arm].point)
             printed = results.printed.get((metric.column, arm))
             if printed is not None:
                 axes.plot(printed.mean, place, "D", mfc="none", mec=base.GREY, ms=6, mew=0.9, zorder=1)
@@ -51,15 +50,3 @@ _CAPTION = (
     "Mean of each metric with its 95 % interval, a row per arm; a number at a dot: trials with a value, "
     "where fewer than all. Hollow diamonds: what the paper prints."
 )
-
-
-def _draw(axes: Axes, panel: Panel, metric: Metric, arm: str, place: int, look: Look) -> None:
-    found = estimate(panel, metric, arm)
-    if not found.n:
-        return
-    axes.plot(found.interval, (place, place), color=look.colour, lw=1.2, zorder=2)
-    axes.plot(found.mean, place, ms=5.0, zorder=3, clip_on=False, **look.point)
-    if found.n < panel.n(arm):
-        axes.annotate(
-            str(found.n), (found.mean, place), (0, 4), textcoords="offset points", ha="center", fontsize=7
-        )

@@ -84,27 +84,13 @@ def _draw_shares(axes: Axes, panel: Panel, metrics: Sequence[Metric], fills: Map
     for metric, width in zip(metrics, shares, strict=True):
         colour, hatch = fills[metric.column]
         name = metric.column.removeprefix("replans_").removesuffix("_replans")
-        look: dict[str, Any] = {
-            "color": colour,
-            "hatch": hatch,
-            "ec": "#404040",
-            "lw": 0.4,
-            "hatch_linewidth": 0.5,
-        }
-        axes.barh(range(len(panel.arms)), width, 0.66, left, label=name, **look)
+        edge: dict[str, Any] = {"hatch": hatch, "ec": "#404040", "lw": 0.4, "hatch_linewidth": 0.5}
+        axes.barh(range(len(panel.arms)), width, 0.66, left, label=name, color=colour, **edge)
         left = left + width
     axes.set_xlim(0.0, 100.0)
 
 
 def _draw_estimates(axes: Axes, panel: Panel, metric: Metric) -> None:
-    for place, arm in enumerate(panel.arms if panel.has(metric) else ()):
-        found = estimate(panel, metric, arm)
-        if not found.n:
-            continue
-        axes.plot(found.interval, (place, place), color=style.BLACK, lw=1.2)
-        axes.plot(found.mean, place, "o", color=style.BLACK, ms=4.5, clip_on=False)
-        if found.n < panel.n(arm):
-            axes.annotate(
-                str(found.n), (found.mean, place), (0, 4), textcoords="offset points", ha="center", fontsize=7
-            )
+    for arm in panel.arms if panel.has(metric) else ():
+        base.draw_estimate(axes, panel, metric, arm, marker="o", color=style.BLACK, ms=4.5)
     axes.set_xlim(left=0.0)
