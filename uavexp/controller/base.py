@@ -14,8 +14,6 @@ class Controller(Protocol):
 
     def reset(self, limits: Limits, mass_kg: float) -> None:
         """Begin a trial."""
-        ...
 
     def command(self, estimated_state: State, reference: Reference) -> Command:
         """Return thrust and attitude that lead the state to the reference."""
-        ...

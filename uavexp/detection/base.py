@@ -18,7 +18,6 @@ class Detection(Protocol):
 
     def reset(self, limits: Limits, rng: np.random.Generator) -> None:
         """Begin a trial with no track."""
-        ...
 
     def detect(self, scan: Scan, field: DistanceField, truth: Bodies) -> tuple[Scan, Tracks]:
         """Split a scan into what the map may fuse and what moves.
@@ -32,4 +31,3 @@ class Detection(Protocol):
             The scan with the returns of movers taken out (NaN: no measurement), and the tracks
             at the scan's time.
         """
-        ...

@@ -14,8 +14,6 @@ class Estimator(Protocol):
 
     def reset(self, rng: np.random.Generator) -> None:
         """Begin a trial, drawing noise from `rng`."""
-        ...
 
     def estimate(self, true_state: State, step_s: float) -> State:
         """Return the believed state after another `step_s`."""
-        ...

@@ -16,15 +16,12 @@ class Explorer(Protocol):
 
     def reset(self, flight_height_m: float, limits: Limits) -> None:
         """Begin a trial at this flight height."""
-        ...
 
     def select(self, observation: Observation, *, fresh: bool = False) -> Goal | None:
         """Return the best goal g* now, or None when no goal is reachable.
 
         With `fresh` a plan is about to be made: no preference for the goal kept so far.
         """
-        ...
 
     def reject(self, position_m: Float, time_s: float) -> None:
         """Set a goal aside for a while: no plan leads there."""
-        ...

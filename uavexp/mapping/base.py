@@ -23,21 +23,16 @@ class MapBackend(Protocol):
         `scene` is the true geometry: a map that is known from the start is made of it, one that
         has to be measured does not look at it.
         """
-        ...
 
     def mark_free(self, centre_m: Float, radius_m: float) -> None:
         """Declare a ball known free (the start bubble); measured surfaces override it."""
-        ...
 
     def integrate(self, scan: Scan) -> None:
         """Fuse one scan (sensor rate)."""
-        ...
 
     def update(self, time_s: float) -> MapUpdate:
         """Bring the ESDF up to date (ESDF rate) and return what changed since the last call."""
-        ...
 
     @property
     def field(self) -> DistanceField:
         """The live distance field, as of the last `update`."""
-        ...

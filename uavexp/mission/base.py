@@ -18,30 +18,23 @@ class Mission(Protocol):
 
     def prepare(self, world: World, rng: np.random.Generator) -> World:
         """Return the world as it really is at the start: this one, unless the mission changes it."""
-        ...
 
     def reset(self, world: World, scene: Scene, limits: Limits) -> None:
         """Begin a trial in `world`."""
-        ...
 
     def guide(self, explorer: Explorer) -> Explorer:
         """Return who chooses the goals: the explorer, unless the mission knows better."""
-        ...
 
     @property
     def target_m(self) -> Float | None:
         """Where the flight is to end, (3,); None when exploring."""
-        ...
 
     @property
     def time_limit_s(self) -> float:
         """Flight time after which the mission has timed out."""
-        ...
 
     def outcome(self, true_state: State, observation: Observation) -> Outcome | None:
         """How the flight ended, or None while it goes on; asked at every step."""
-        ...
 
     def findings(self) -> Inspection:
         """What only this mission knows of the flight; nothing for most."""
-        ...

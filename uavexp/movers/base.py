@@ -19,8 +19,6 @@ class Movers(Protocol):
         Raises:
             WorldError: the bodies do not fit in.
         """
-        ...
 
     def at(self, time_s: float) -> Bodies:
         """The bodies at a time >= 0; a function of time alone."""
-        ...

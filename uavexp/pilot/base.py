@@ -40,7 +40,6 @@ class Pilot(Protocol):
 
     def begin(self, crew: Crew) -> Piloting:
         """Begin a trial."""
-        ...
 
 
 class Piloting(Protocol):
@@ -57,16 +56,12 @@ class Piloting(Protocol):
     @property
     def ever_planned(self) -> bool:
         """Whether any plan was found."""
-        ...
 
     def reference(self, time_s: float, step_s: float) -> Reference:
         """What to follow now; asked at every step."""
-        ...
 
     def explore(self, observation: Observation) -> None:
         """Choose a goal anew; asked at the explorer's rate."""
-        ...
 
     def decide(self, observation: Observation) -> float:
         """Ask safety and trigger after an ESDF update; returns the trigger's score."""
-        ...

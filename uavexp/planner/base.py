@@ -14,7 +14,6 @@ class Planner(Protocol):
 
     def reset(self, limits: Limits, rng: np.random.Generator) -> None:
         """Begin a trial of a vehicle with these limits."""
-        ...
 
     def plan(self, request: PlanRequest) -> PlanResult:
         """Return a trajectory or the reason why there is none; never raises for a hard problem.
@@ -23,4 +22,3 @@ class Planner(Protocol):
         acceleration, keeps the limits along its whole length, ends at the goal (at rest
         when the goal is the target) and keeps clear of mapped obstacles.
         """
-        ...

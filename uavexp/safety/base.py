@@ -12,8 +12,6 @@ class Safety(Protocol):
 
     def reset(self, limits: Limits) -> None:
         """Begin a trial."""
-        ...
 
     def must_brake(self, observation: Observation) -> bool:
         """Whether to leave the trajectory and stop now."""
-        ...

@@ -17,8 +17,6 @@ class Sensor(Protocol):
 
     def reset(self, scene: Scene, rng: np.random.Generator) -> None:
         """Begin a trial in `scene`, drawing noise from `rng`."""
-        ...
 
     def capture(self, true_state: State, estimated_state: State, time_s: float) -> Scan:
         """Measure from the true pose; the scan carries the pose believed (estimated)."""
-        ...

@@ -14,12 +14,9 @@ class TriggerPolicy(Protocol):
 
     def reset(self, limits: Limits) -> None:
         """Begin a trial."""
-        ...
 
     def planned(self, trajectory: Trajectory, field: DistanceField) -> None:
         """Take note of a new plan and of the live map it was made on (copy what is kept)."""
-        ...
 
     def decide(self, observation: Observation) -> Decision:
         """Whether to replan now, and why."""
-        ...

@@ -15,16 +15,12 @@ class Vehicle(Protocol):
     @property
     def limits(self) -> Limits:
         """What may be asked of it."""
-        ...
 
     def reset(self, state: State) -> None:
         """Begin a trial hovering in `state`."""
-        ...
 
     def step(self, command: Command, step_s: float) -> State:
         """Advance by `step_s` under a constant command and return the new state."""
-        ...
 
     def place(self, state: State) -> None:
         """Overwrite position, velocity, attitude and rate (after a contact)."""
-        ...

@@ -14,4 +14,3 @@ class WorldGenerator(Protocol):
 
     def generate(self, rng: np.random.Generator) -> World:
         """Return the world; raise `WorldError` in one line when none can be made."""
-        ...
