@@ -101,3 +101,24 @@ def obstacle_course() -> tuple[Bool, Float, Float]:
     box(grid, (2.5, 0.0, 0.0), (3.1, 3.7, 2.4))
     box(grid, (5.5, 2.2, 0.0), (6.1, 6.0, 2.4))
     return grid, np.array([1.05, 2.05, 1.25]), np.array([7.75, 3.85, 1.25])
+
+
+def quintic(request: PlanRequest, duration_s: float) -> Trajectory:
+    """The one polynomial of degree 5 from a request's state to rest at its goal: a plan for empty space."""
+    start = np.stack([request.position_m, request.velocity_mps, 0.5 * request.acceleration_mps2])
+    power = np.arange(6)
+    slope, curvature = power, power * (power - 1)
+    ends = np.stack(
+        [
+            duration_s**power,
+            slope * duration_s ** np.maximum(power - 1.0, 0.0),
+            curvature * duration_s ** np.maximum(power - 2.0, 0.0),
+        ]
+    )
+    wanted = np.stack([request.goal.position_m, np.zeros(3), np.zeros(3)])
+    upper = np.linalg.solve(ends[:, 3:], wanted - ends[:, :3] @ start)
+    return Trajectory(
+        breaks_s=request.time_s + np.array([0.0, duration_s]),
+        coefficients=np.concatenate([start, upper])[None],
+        at_rest=True,
+    )

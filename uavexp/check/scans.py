@@ -75,6 +75,7 @@ def take_ray_scan(
     position_m: tuple[float, float, float],
     direction: Float,
     *,
+    time_s: float = 0.0,
     max_range_m: float = 12.0,
     noise: np.random.Generator | None = None,
 ) -> RayScan:
@@ -91,7 +92,7 @@ def take_ray_scan(
     if noise is not None:
         range_m = range_m + 0.02 * noise.normal(size=range_m.shape)
     return RayScan(
-        time_s=0.0,
+        time_s=time_s,
         origin_m=position,
         direction=direction.astype(np.float32),
         range_m=np.where(range_m > max_range_m, np.inf, range_m).astype(np.float32),

@@ -50,8 +50,8 @@ def subjects(composer: Composer, settings: Sequence[Setting]) -> list[Subject]:
         return [_subject(composer, group, option, values) for group, option in chosen]
     every = [(group, option) for group in GROUPS for option in composer.options[group]]
     return [
-        Subject(group=group, option=option, make=None, lacking=lacking)
-        if (lacking := _lacking(composer, group, option))
+        Subject(group=group, option=option, make=None, lacking=", ".join(names))
+        if (names := lacking(composer, group, option))
         else _subject(composer, group, option, [])
         for group, option in every
     ]
@@ -64,7 +64,7 @@ def _subject(composer: Composer, group: str, option: str, values: Sequence[Setti
     return Subject(group=group, option=option, make=functools.partial(build_component, group, tree))
 
 
-def _lacking(composer: Composer, group: str, option: str) -> str:
-    """The parameters that have no default."""
+def lacking(composer: Composer, group: str, option: str) -> list[str]:
+    """The parameters of an option that have no default."""
     parameters = read_option(composer.options[group][option]).parameters
-    return ", ".join(f"{group}.{item.name}" for item in parameters if item.default == MISSING)
+    return [f"{group}.{item.name}" for item in parameters if item.default == MISSING]

@@ -10,25 +10,13 @@ import numpy as np
 import pytest
 
 from uavexp.check.promise import breach, promises
+from uavexp.check.requests import quintic
 from uavexp.field import OCCUPIED
 from uavexp.trajectory import Trajectory
 from uavexp.types import Limits, PlanRequest, PlanResult, PlanStatus
 
+SLOW_S = 12.0
 REFUSED = PlanResult(status=PlanStatus.NOT_CLEAR, reason="something is mapped")
-
-
-def quintic(request: PlanRequest, duration_s: float = 12.0) -> Trajectory:
-    """The polynomial of degree 5 from the request's state to rest at its goal."""
-    start = np.stack([request.position_m, request.velocity_mps, 0.5 * request.acceleration_mps2])
-    k, t = np.arange(6), duration_s
-    ends = np.stack([t**k, k * t ** np.maximum(k - 1.0, 0.0), k * (k - 1) * t ** np.maximum(k - 2.0, 0.0)])
-    wanted = np.stack([request.goal.position_m, np.zeros(3), np.zeros(3)])
-    upper = np.linalg.solve(ends[:, 3:], wanted - ends[:, :3] @ start)
-    return Trajectory(
-        breaks_s=request.time_s + np.array([0.0, duration_s]),
-        coefficients=np.concatenate([start, upper])[None],
-        at_rest=True,
-    )
 
 
 def answer(trajectory: Trajectory) -> PlanResult:
@@ -37,7 +25,7 @@ def answer(trajectory: Trajectory) -> PlanResult:
 
 def honest(request: PlanRequest, asked: int) -> PlanResult:
     """Fly slowly where nothing is mapped and refuse everywhere else."""
-    return REFUSED if (request.field.state == OCCUPIED).any() else answer(quintic(request))
+    return REFUSED if (request.field.state == OCCUPIED).any() else answer(quintic(request, SLOW_S))
 
 
 @dataclass
@@ -60,7 +48,7 @@ def fast(request: PlanRequest, asked: int) -> PlanResult:
 
 
 def blind(request: PlanRequest, asked: int) -> PlanResult:
-    return answer(quintic(request))
+    return answer(quintic(request, SLOW_S))
 
 
 def short(request: PlanRequest, asked: int) -> PlanResult:
@@ -83,7 +71,7 @@ def from_rest(request: PlanRequest, asked: int) -> PlanResult:
 
 def jumping(request: PlanRequest, asked: int) -> PlanResult:
     """To rest at the goal, and from there on as if it stood 0.1 m higher."""
-    first = quintic(request)
+    first = quintic(request, SLOW_S)
     up = np.zeros((1, 6, 3))
     up[0, 0] = np.add(request.goal.position_m, [0.0, 0.0, 0.1])
     pieces = np.concatenate([first.coefficients, up])

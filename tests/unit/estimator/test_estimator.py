@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -91,3 +93,15 @@ def test_refuses_a_bound_below_the_rms():
         ConfigError, match=r"max_position_drift_mps must be >= the rms drift of 0.1, got 0.05"
     ):
         Drift(position_drift_mps=0.1)
+
+
+@pytest.mark.parametrize("estimator", [Perfect(), Drift()], ids=["perfect", "drift"])
+def test_believed_velocity_is_the_rate_of_believed_position(estimator):
+    step_s, velocity, believed = 0.01, np.array([0.5, 0.0, -0.5]), []
+    estimator.reset(np.random.default_rng(1))
+    for k in range(100):
+        truth = replace(ORIGIN, position_m=k * step_s * velocity, velocity_mps=velocity)
+        believed.append(estimator.estimate(truth, step_s))
+    for before, after in pairwise(believed):
+        rate = (after.position_m - before.position_m) / step_s
+        np.testing.assert_allclose(rate, before.velocity_mps, atol=1e-9)

@@ -1,0 +1,65 @@
+"""What everything that may stop the vehicle promises, on the flight that triggers are checked on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from uavexp.check.hall import LIMITS, PILLAR, elsewhere, flight, observe, room
+from uavexp.check.promise import Make, keep, untouched
+from uavexp.types import Observation
+
+
+def _answers(safety: Any, seen: tuple[Observation, ...]) -> list[bool]:
+    safety.reset(LIMITS)
+    return [safety.must_brake(observation) for observation in seen]
+
+
+def _keep_same(have: list[bool], want: list[bool], where: str) -> None:
+    for observation, one, other in zip(flight(), have, want, strict=True):
+        words = {True: "brakes", False: "flies on"}
+        keep(
+            one == other,
+            f"at {observation.time_s:.1f} s it {words[one]} {where}, it {words[other]} otherwise",
+        )
+
+
+def says_yes_or_no_at_every_update(make: Make) -> None:
+    """True, False, and nothing else."""
+    for observation, answer in zip(flight(), _answers(make(), flight()), strict=True):
+        keep(answer in (True, False), f"at {observation.time_s:.1f} s it answers {answer!r}")
+
+
+def lets_the_vehicle_fly_where_all_is_free(make: Make) -> None:
+    """Through a hall that is mapped and empty."""
+    free = tuple(replace(observation, field=room()) for observation in flight())
+    for observation, answer in zip(free, _answers(make(), free), strict=True):
+        keep(not answer, f"it brakes at {observation.time_s:.1f} s in free space")
+
+
+def has_nothing_to_stop_before_there_is_a_plan(make: Make) -> None:
+    """Whatever the map says."""
+    (answer,) = _answers(make(), (replace(observe(room(PILLAR)), trajectory=None),))
+    keep(not answer, "it brakes before the first plan")
+
+
+def forgets_the_last_trial_at_a_reset(make: Make) -> None:
+    """The second flight of one object is the first of another."""
+    used = make()
+    _answers(used, flight())
+    _keep_same(_answers(used, flight()), _answers(make(), flight()), "in its second flight")
+
+
+def decides_the_same_wherever_the_world_stands(make: Make) -> None:
+    """A hall that stands elsewhere is the same hall."""
+    there = tuple(map(elsewhere, flight()))
+    _keep_same(_answers(make(), there), _answers(make(), flight()), "in a hall that stands elsewhere")
+
+
+def writes_into_nothing_it_is_given(make: Make) -> None:
+    """Map, plan and observation are the trial's own."""
+    safety = make()
+    safety.reset(LIMITS)
+    for observation in flight():
+        with untouched(observation=observation):
+            safety.must_brake(observation)
