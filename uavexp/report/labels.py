@@ -70,6 +70,8 @@ def metrics_of(names: Iterable[str]) -> tuple[Metric, ...]:
 
 
 def _metric(name: str) -> Metric:
+    if name in _BY_COLUMN:  # its name may have a point: prediction_error_0.3s_m
+        return _BY_COLUMN[name]
     module, _, column = name.rpartition(".")
     known = {metric.column: metric for metric in own_metrics([module])} if module else _BY_COLUMN
     if column not in known:
