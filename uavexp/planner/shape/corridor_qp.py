@@ -28,7 +28,6 @@ from typing import Annotated, ClassVar, NamedTuple
 import numpy as np
 
 from uavexp.arrays import Float
-from uavexp.braking import stopping_distance_m
 from uavexp.parameters import NonNegative, Positive, between, option
 from uavexp.planner.constraints import Constraints
 from uavexp.planner.find.base import FoundPath
@@ -39,7 +38,7 @@ from uavexp.planner.shape.cone_program import NO_CUTS, Problem, solve
 from uavexp.planner.shape.course import Given, at_shares, course, space_of
 from uavexp.planner.shape.excess import unavoidable
 from uavexp.planner.shape.flight_corridor import make_corridor
-from uavexp.planner.shape.start import REST_MPS, SHORTEST_S, TANGENT_M, refusal, state_of
+from uavexp.planner.shape.start import REST_MPS, SHORTEST_S, TANGENT_M, end_velocity, refusal, state_of
 from uavexp.planner.shape.stop_first import braking, standing
 from uavexp.planner.shape.timing import STEP_M, resample
 from uavexp.planner.spline.clamped import Basis, make_basis, to_trajectory
@@ -157,20 +156,13 @@ class CorridorQp:
         request, limits = given.request, given.constraints.limits
         path = resample(given.path, STEP_M)
         along = path[-1] - path[max(len(path) - 1 - round(TANGENT_M / STEP_M), 0)]
-        length = float(np.linalg.norm(along))
-        if length < 1e-6:
-            return np.zeros(3)
-        start = float(np.linalg.norm(request.velocity_mps))
-        travel_m = STEP_M * (len(path) - 1)
-        reachable = math.sqrt(start**2 + limits.max_acceleration_mps2 * travel_m)
-        speed = min(self.end_speed_mps, 0.9 * limits.max_speed_mps, reachable)
-        space = space_of(given, 0.0)
-        for share in (1.0, 0.7, 0.4):
-            velocity: Float = share * speed / length * along
-            beyond = path[-1] + stopping_distance_m(share * speed, limits) / length * along
-            if straight_is_free(space, path[-1], beyond)[0]:
-                return velocity
-        return np.zeros(3)
+        length, space = float(np.linalg.norm(along)), space_of(given, 0.0)
+
+        def clear(stop_m: float) -> bool:
+            return bool(straight_is_free(space, path[-1], path[-1] + stop_m / length * along)[0])
+
+        travel_m, start_mps = STEP_M * (len(path) - 1), request.velocity_mps
+        return end_velocity(along, travel_m, start_mps, limits, self.end_speed_mps, clear)
 
     def _brake_first(self, given: Given, failed: ShapedPath) -> ShapedPath:
         """Stop, then fly from there; the failure of the direct attempt when that fails, too."""

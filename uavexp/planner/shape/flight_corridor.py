@@ -136,6 +136,52 @@ def _extent(normal: Float, apart_m: float, voxel_m: float) -> float:
 
 
 @nb.njit(cache=True)
+def _cut_off(
+    a: Float, b: Float, centre: Float, apart: Float, voxel_m: float, normal: Float, offset: Float, faces: int
+) -> tuple[int, bool]:
+    """Write, from row `faces` on, the planes that cut obstacles off segment ab.
+
+    Returns:
+        The next row, and whether every obstacle is cut off.
+    """
+    nearest, away = np.empty(3), np.empty(3)
+    left = centre.shape[0]
+    far = np.empty(left)
+    for n in range(left):
+        reach = _nearest_on_segment(a, b, centre[n], nearest)
+        for axis in range(3):
+            away[axis] = (centre[n, axis] - nearest[axis]) / max(reach, 1e-9)
+        far[n] = reach - _extent(away, apart[n], voxel_m)
+    for _ in range(_MOST_FACES):
+        if left == 0:
+            break
+        best = 0
+        for n in range(1, left):
+            if far[n] < far[best]:
+                best = n
+        reach = _nearest_on_segment(a, b, centre[best], nearest)
+        if reach < 1e-9:  # the segment meets an obstacle's centre: there is no free side
+            break
+        spare = max(far[best] - _ROUNDING_M, 0.0)
+        at = 0.0
+        for axis in range(3):
+            normal[faces, axis] = (centre[best, axis] - nearest[axis]) / reach
+            at += normal[faces, axis] * nearest[axis]
+        offset[faces] = at + spare
+        kept = 0
+        for n in range(left):  # keep those that the plane does not keep at their clearance
+            beyond = -_extent(normal[faces], apart[n], voxel_m) - offset[faces] - min(far[best], 0.0)
+            for axis in range(3):
+                beyond += normal[faces, axis] * centre[n, axis]
+            if beyond < -_ROUNDING_M and n != best:
+                centre[kept], apart[kept], far[kept] = centre[n], apart[n], far[n]
+                kept += 1
+        left = kept
+        faces += 1
+    return faces, left == 0
+
+
+@nb.njit(cache=True)
 def _grow(
     distance: Float32,
     state: UInt8,
@@ -150,7 +196,7 @@ def _grow(
     segments = points_m.shape[0] - 1
     normal, offset = np.empty((segments * (_MOST_FACES + 6), 3)), np.empty(segments * (_MOST_FACES + 6))
     first = np.zeros(segments + 1, dtype=np.int64)
-    nearest, away, box = np.empty(3), np.empty(3), np.empty((2, 3))
+    box = np.empty((2, 3))
     faces, whole = 0, True
     for m in range(segments):
         a, b = points_m[m], points_m[m + 1]
@@ -166,42 +212,7 @@ def _grow(
             box[0, axis] -= clearance_m + voxel_m  # an obstacle outside keeps the curve off the inside
             box[1, axis] += clearance_m + voxel_m
         centre, apart = _collect(distance, state, origin_m, voxel_m, box, clearance_m, known_only)
-        left = centre.shape[0]
-        far = np.empty(left)
-        for n in range(left):
-            reach = _nearest_on_segment(a, b, centre[n], nearest)
-            for axis in range(3):
-                away[axis] = (centre[n, axis] - nearest[axis]) / max(reach, 1e-9)
-            far[n] = reach - _extent(away, apart[n], voxel_m)
-        for face in range(_MOST_FACES + 1):
-            if left == 0:
-                break
-            if face == _MOST_FACES:
-                whole = False
-                break
-            best = 0
-            for n in range(1, left):
-                if far[n] < far[best]:
-                    best = n
-            reach = _nearest_on_segment(a, b, centre[best], nearest)
-            if reach < 1e-9:  # the segment meets an obstacle's centre: there is no free side
-                whole = False
-                break
-            spare = max(far[best] - _ROUNDING_M, 0.0)
-            at = 0.0
-            for axis in range(3):
-                normal[faces, axis] = (centre[best, axis] - nearest[axis]) / reach
-                at += normal[faces, axis] * nearest[axis]
-            offset[faces] = at + spare
-            kept = 0
-            for n in range(left):  # keep those that the plane does not keep at their clearance
-                beyond = -_extent(normal[faces], apart[n], voxel_m) - offset[faces] - min(far[best], 0.0)
-                for axis in range(3):
-                    beyond += normal[faces, axis] * centre[n, axis]
-                if beyond < -_ROUNDING_M and n != best:
-                    centre[kept], apart[kept], far[kept] = centre[n], apart[n], far[n]
-                    kept += 1
-            left = kept
-            faces += 1
+        faces, cut = _cut_off(a, b, centre, apart, voxel_m, normal, offset, faces)
+        whole = whole and cut
         first[m + 1] = faces
     return normal[:faces].copy(), offset[:faces].copy(), first, whole

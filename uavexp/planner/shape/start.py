@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
 from uavexp.arrays import Float
+from uavexp.braking import stopping_distance_m
 from uavexp.planner.shape.timing import STEP_M
 from uavexp.types import Limits, PlanRequest
 
@@ -38,3 +40,33 @@ def on_path(path_m: Float, velocity_mps: Float, max_acceleration_mps2: float) ->
     # a vehicle moving away needs v/a to stop and sqrt(2) v/a to come back
     lost = across + (1.0 + math.sqrt(2.0)) * max(-along, 0.0)
     return max(along, 0.0), lost / max_acceleration_mps2
+
+
+def end_velocity(
+    along_m: Float,
+    travel_m: float,
+    start_mps: Float,
+    limits: Limits,
+    end_speed_mps: float,
+    clear: Callable[[float], bool],
+) -> Float:
+    """Velocity (3,) along a path's end that can be reached, and stopped from on clear ground, else zero.
+
+    Args:
+        along_m: (3,) in the path's last direction.
+        travel_m: length of the path.
+        start_mps: (3,) velocity at its start.
+        limits: of the vehicle.
+        end_speed_mps: wanted.
+        clear: whether the ground is, for so many metres beyond the end.
+    """
+    length = float(np.linalg.norm(along_m))
+    if length < 1e-6:
+        return np.zeros(3)
+    start = float(np.linalg.norm(start_mps))
+    reachable = math.sqrt(start**2 + limits.max_acceleration_mps2 * travel_m)
+    speed = min(end_speed_mps, 0.9 * limits.max_speed_mps, reachable)
+    for share in (1.0, 0.7, 0.4):
+        if clear(stopping_distance_m(share * speed, limits)):
+            return np.asarray(share * speed / length * along_m)
+    return np.zeros(3)

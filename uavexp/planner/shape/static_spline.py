@@ -18,7 +18,6 @@ from typing import Annotated, ClassVar
 import numpy as np
 
 from uavexp.arrays import Float
-from uavexp.braking import stopping_distance_m
 from uavexp.parameters import Count, NonNegative, Positive, between, option
 from uavexp.planner.constraints import Constraints
 from uavexp.planner.find.base import FoundPath
@@ -26,7 +25,7 @@ from uavexp.planner.movers.moving import MovingObstacles
 from uavexp.planner.shape.base import ShapedPath
 from uavexp.planner.shape.excess import instants, limit_excess
 from uavexp.planner.shape.qp import solve_qp
-from uavexp.planner.shape.start import TANGENT_M
+from uavexp.planner.shape.start import TANGENT_M, end_velocity
 from uavexp.planner.shape.static_step import Cost, limit_rows, line_search, local_model
 from uavexp.planner.shape.successive import (
     Curve,
@@ -87,22 +86,18 @@ class StaticSpline:
         """Velocity (3,) along the path's end that can be reached, and stopped from on clear ground."""
         if request.goal.is_target or self.stop_at_ends or self.end_speed_mps == 0.0:
             return np.zeros(3)
-        limits, goal_m = constraints.limits, path_m[-1]
+        goal_m = path_m[-1]
         back_m = np.cumsum(np.linalg.norm(np.diff(path_m[::-1], axis=0), axis=1))
         near = min(int(np.searchsorted(back_m, TANGENT_M)) + 1, len(path_m) - 1)
         along = goal_m - path_m[-1 - near]
         length = float(np.linalg.norm(along))
-        if length < 1e-6:
-            return np.zeros(3)
-        start = float(np.linalg.norm(request.velocity_mps))
-        reachable = float(np.sqrt(start**2 + limits.max_acceleration_mps2 * back_m[-1]))
-        speed = min(self.end_speed_mps, 0.9 * limits.max_speed_mps, reachable)
-        for share in (1.0, 0.7, 0.4):
-            stop_m = stopping_distance_m(share * speed, limits) + _AHEAD_M
-            ahead = np.arange(0.0, stop_m, _AHEAD_M)[:, None] * along / length
-            if not constraints.shortfall(request, goal_m + ahead):
-                return np.asarray(share * speed / length * along)
-        return np.zeros(3)
+
+        def clear(stop_m: float) -> bool:
+            ahead = np.arange(0.0, stop_m + _AHEAD_M, _AHEAD_M)[:, None] * along / length
+            return not constraints.shortfall(request, goal_m + ahead)
+
+        travel_m, start_mps = float(back_m[-1]), request.velocity_mps
+        return end_velocity(along, travel_m, start_mps, constraints.limits, self.end_speed_mps, clear)
 
 
 class _AnyOrder:
