@@ -1,6 +1,6 @@
 """A B-spline among static obstacles, followed by model predictive control among moving ones (paper 3).
 
-    A* path -> static spline (`mpc.static_spline`, eqs. 1 and 2), kept while it stays clear
+    A* path -> static spline (`shape.static_spline`, eqs. 1, 2), kept while it stays clear
             -> horizon that follows it and keeps out of predicted movers (`mpc.horizon`, eqs. 3a to 3f)
             -> quintic back to the spline and the rest of it to the goal (`mpc.rejoin`)
 

@@ -1,1 +1,1 @@
-"""Parts of `bspline_mpc`: the static spline, the horizon that follows it, the regions both keep out of."""
+"""Parts of `bspline_mpc`: the guide, the horizon that follows it, the regions both keep out of."""

@@ -160,18 +160,15 @@ class _Cubic:
         )
 
     def guess(self, points_m: Float, times_s: Float, duration_s: float) -> Float:
-        """`Model.guess`."""
         h, stretch = duration_s / self.spans, duration_s / float(times_s[-1])
         control: Float = place_by_time(points_m, times_s, self.spans + 3, h, stretch)
         return control
 
     def pin(self, curve: Curve) -> Curve:
-        """`Model.pin`."""
         pin_ends(curve.control, curve.h, self.route.start, self.route.end)
         return curve
 
     def improve(self, curve: Curve, rounds: int) -> tuple[Curve, bool, int]:
-        """`Model.improve`."""
         control, h = curve
         for count in range(1, rounds + 1):
             by = self._tethered(control)._replace(h=h)
@@ -200,12 +197,11 @@ class _Cubic:
         return self.merit._replace(tether_m=raw[np.argmin(apart, axis=1)], tether_weight=weight)
 
     def points(self, curve: Curve) -> Float:
-        """`Model.points`."""
         points: Float = sample_spline(curve.control, 2 * SAMPLES)
         return points
 
     def excess(self, curve: Curve) -> float:
-        """`Model.excess`; exact."""
+        """Exact."""
         limits = self.constraints.limits
         _, velocity, acceleration = self.route.start
         fast, strong = unavoidable(velocity, acceleration, limits.max_acceleration_mps2, curve.h)
@@ -216,7 +212,7 @@ class _Cubic:
         return max(too_fast, math.sqrt(too_strong))
 
     def shortfall(self, curve: Curve) -> str:
-        """`Model.shortfall`, every half voxel."""
+        """Every half voxel."""
         request, constraints = self.request, self.constraints
         longest = float(np.linalg.norm(np.diff(curve.control, axis=0), axis=1).max())
         per_segment = max(math.ceil(longest / (0.5 * request.field.voxel_size_m)), 1)
@@ -227,6 +223,5 @@ class _Cubic:
         return fixed or self.movers.shortfall(points, times, strongest)
 
     def trajectory(self, curve: Curve) -> Trajectory:
-        """`Model.trajectory`."""
         request = self.request
         return to_trajectory(self.power, curve.control, curve.h, request.time_s, request.goal.is_target)

@@ -128,18 +128,16 @@ class _AnyOrder:
         )
 
     def guess(self, points_m: Float, times_s: Float, duration_s: float) -> Float:
-        """`Model.guess`: a control point lies where its basis function peaks."""
+        """A control point lies where its basis function peaks."""
         h = duration_s / self.spans
         peaks = (np.arange(self.count) - 0.5 * (self.basis.degree - 1)) * h * float(times_s[-1]) / duration_s
         return np.stack([np.interp(peaks, times_s, points_m[:, axis]) for axis in range(3)], axis=1)
 
     def pin(self, curve: Curve) -> Curve:
-        """`Model.pin`."""
         pin_ends(self.basis, curve.control, curve.h, self.route.start, self.route.end)
         return curve
 
     def improve(self, curve: Curve, rounds: int) -> tuple[Curve, bool, int]:
-        """`Model.improve`."""
         control, h = curve
         points, raw = self.basis.samples @ control, self.route.raw
         apart = ((points[:, None, :] - raw[None, :, :]) ** 2).sum(axis=2)
@@ -156,19 +154,17 @@ class _AnyOrder:
         return Curve(control, h), True, count
 
     def points(self, curve: Curve) -> Float:
-        """`Model.points`."""
         flown = self.trajectory(curve)
         return evaluate(flown, instants(flown))[0]
 
     def excess(self, curve: Curve) -> float:
-        """`Model.excess`, every `instants`."""
+        """At `instants`."""
         return limit_excess(self.trajectory(curve), self.constraints.limits, curve.h)
 
     def shortfall(self, curve: Curve) -> str:
-        """`Model.shortfall`, every `instants`."""
+        """At `instants`."""
         return self.constraints.shortfall(self.request, self.points(curve))
 
     def trajectory(self, curve: Curve) -> Trajectory:
-        """`Model.trajectory`."""
         at_rest = self.request.goal.is_target
         return to_trajectory(self.basis.power, curve.control, curve.h, self.request.time_s, at_rest)

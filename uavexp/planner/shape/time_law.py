@@ -1,4 +1,4 @@
-"""No smoothing: the straight ways of a path, each flown from rest to rest.
+"""Shaper `time_law`: the straight ways of a path, each flown from rest to rest.
 
 On a way of length d the distance is d (10 s³ - 15 s⁴ + 6 s⁵), s = t / T: velocity and acceleration are
 zero at both ends, so both are continuous at every corner, and the path is not left by a hair. T is
@@ -36,7 +36,7 @@ _POWERS = np.array([0.0, 0.0, 0.0, 10.0, -15.0, 6.0])
 
 @option
 class TimeLaw:
-    """Smoother `none`; see the module. Times that came with a path are not used."""
+    """Rests at every corner; see the module. Times that came with a path are not used."""
 
     sees_movers: ClassVar[bool] = False
 

@@ -30,7 +30,7 @@ _SHORTEST_S = 0.1  # of a trajectory to where the vehicle already is
 
 @option
 class WaypointSpline:
-    """Smoother `waypoint_spline`; see the module. Times that came with a path are not used."""
+    """Unchecked spline through the corners; see the module. Times that came with a path are not used."""
 
     sees_movers: ClassVar[bool] = False
 
