@@ -7,8 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uavexp.check.fields import bounds, box, empty, field_from
+from uavexp.parameters import Unknown
 from uavexp.planner.bspline_qp import BsplineQp
-from uavexp.planner.shape.corridor_qp import Derivative
+from uavexp.planner.shape.corridor_qp import CorridorQp, Derivative
 from uavexp.trajectory import evaluate
 from uavexp.types import Goal, Limits, PlanRequest, PlanStatus
 
@@ -16,9 +17,9 @@ LIMITS = Limits(
     max_speed_mps=2.5, max_acceleration_mps2=2.5, max_body_rate_radps=2.0, body_size_m=(0.32, 0.32, 0.12)
 )
 PLANNERS = [
-    BsplineQp(derivative=derivative, unknown=unknown)
+    BsplineQp(shape=CorridorQp(derivative=derivative), unknown=unknown)
     for derivative in Derivative
-    for unknown in ("optimistic", "conservative")
+    for unknown in Unknown
 ]
 for planner in PLANNERS:
     planner.reset(LIMITS, np.random.default_rng(0))
@@ -91,5 +92,5 @@ def test_plan_keeps_its_promises(
     else:
         escaped = int(np.argmax(clearance >= 0.26))
         assert clearance[escaped:].min() >= 0.25
-    if planner.unknown == "conservative" and field.observed(position[:1])[0]:
+    if planner.unknown is Unknown.CONSERVATIVE and field.observed(position[:1])[0]:
         assert field.observed(position).all()
