@@ -24,7 +24,8 @@ from uavexp.geometry import polyline_length_m
 from uavexp.mapping.known import Known
 from uavexp.planner.df_bitstar import DfBitstar
 from uavexp.planner.find.free_space import free_space
-from uavexp.planner.find.ompl_server import Query, search_with_ompl
+from uavexp.planner.find.ompl_search import Query
+from uavexp.planner.find.ompl_server import search_with_ompl
 from uavexp.planner.find.tree import Tree
 from uavexp.planner.shape.corridor_qp import CorridorQp
 from uavexp.planner.shape.waypoint_spline import WaypointSpline

@@ -54,7 +54,7 @@ def help_text(user_folder: Path | None = None, group: str | None = None) -> str:
     lines = [USAGE, "groups and options (* is the default)"]
     for name, files in _ordered(options).items():
         words = [f"{'*' if defaults.get(name) == option else ''}{option}" for option in files]
-        lines.append(f"  {name:<11} {'  '.join(words)}")
+        lines.append(f"  {name:<13} {'  '.join(words)}")
     lines += ["", "keys of no group", *_parameter_lines(config, "")]
     lines += ["", "experiments", *_experiment_lines(user_folder), ""]
     lines += [_group_text(name, files) for name, files in _ordered(options).items() if name != PRESET_GROUP]
@@ -106,6 +106,6 @@ def _defaults(file: Path) -> dict[str, str]:
 
 def _docstring(group: str, option: str) -> str:
     """First line of the docstring of the option's module, which is not imported."""
-    file = PACKAGE / group / f"{option}.py"
+    file = PACKAGE.joinpath(*group.split("."), f"{option}.py")
     text = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) if file.is_file() else None
     return text.splitlines()[0] if text else ""

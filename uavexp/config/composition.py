@@ -193,7 +193,18 @@ class Composer:
                 chosen[setting.key] = self._option(setting.key, setting.values[0])
             else:
                 values.append(setting)
+        self._check_held(chosen)
         return chosen, values
+
+    def _check_held(self, chosen: Mapping[str, str]) -> None:
+        """Refuse an option for what the chosen one does not hold (planner.find)."""
+        whole = {group: option for group, option in chosen.items() if "." not in group}
+        for group in chosen.keys() - whole.keys():
+            holder, _, held = group.rpartition(".")
+            tree = self._trees.of(whole)
+            if held not in tree[holder]:
+                option = tree["hydra"]["runtime"]["choices"][holder]
+                raise ConfigError(f"{group}={chosen[group]}: {holder}={option} holds no {held}")
 
     def _option(self, group: str, name: Any) -> str:
         known = self.options.get(group, {})

@@ -13,12 +13,12 @@ The answer depends on the request, and on what the planner was reset with, alone
 
 from __future__ import annotations
 
-import copy
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -68,6 +68,7 @@ class FindAndShape:
     # long; 0: movers do not count [ours]
     _constraints: Constraints | None = field(default=None, init=False, repr=False)
     _rng: np.random.Generator = field(init=False, repr=False)
+    _drawn_from: Mapping[str, Any] = field(init=False, repr=False)  # state of `_rng` at every request
 
     def __post_init__(self) -> None:
         require(
@@ -77,7 +78,7 @@ class FindAndShape:
 
     def reset(self, limits: Limits, rng: np.random.Generator) -> None:
         """Begin a trial of a vehicle with these limits; every request draws from the same new stream."""
-        self._rng = copy.deepcopy(rng)
+        self._rng, self._drawn_from = rng, rng.bit_generator.state
         self._constraints = Constraints(
             limits=limits,
             min_clearance_m=self.min_clearance_m,
@@ -144,12 +145,13 @@ class FindAndShape:
         self, request: PlanRequest, constraints: Constraints, movers: MovingObstacles, rung: Rung
     ) -> PlanResult:
         """Search and shape once."""
-        movers = replace(movers, margin_m=rung.margin * movers.margin_m)
+        if rung.margin != 1.0:
+            movers = replace(movers, margin_m=rung.margin * movers.margin_m)
         sees, began_s = self.shape.sees_movers, time.perf_counter()
         asked = request if rung.pace is None else met(request, constraints, movers, rung.pace, not sees)
-        found = self.find.find(asked, constraints, copy.deepcopy(self._rng))
+        found = self._found(asked, constraints)
         if found.status is not PlanStatus.OK and sees and asked is not request:
-            found = self.find.find(request, constraints, copy.deepcopy(self._rng))
+            found = self._found(request, constraints)
         searched_s = time.perf_counter()
         shaped = self._shaped(request if sees else asked, found, constraints, movers)
         return PlanResult(
@@ -165,6 +167,10 @@ class FindAndShape:
             wall_search_s=searched_s - began_s if found.wall_s is None else found.wall_s,
             wall_optimise_s=time.perf_counter() - searched_s,
         )
+
+    def _found(self, request: PlanRequest, constraints: Constraints) -> FoundPath:
+        self._rng.bit_generator.state = self._drawn_from
+        return self.find.find(request, constraints, self._rng)
 
     def _shaped(
         self, request: PlanRequest, found: FoundPath, constraints: Constraints, movers: MovingObstacles

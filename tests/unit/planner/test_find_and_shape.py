@@ -70,3 +70,8 @@ def test_finder_and_shaper_are_chosen_like_a_group_and_set_like_a_parameter() ->
 def test_errors_say_what_may_be_typed(typed: str, words: str) -> None:
     with pytest.raises(ConfigError, match=words):
         Composer().cell(parse_settings(["planner=min_acc", typed]))
+
+
+def test_what_an_option_does_not_hold_cannot_be_chosen() -> None:
+    with pytest.raises(ConfigError, match=r"planner.shape=scp: planner=bspline_mpc holds no shape"):
+        Composer().cell(parse_settings(["planner=bspline_mpc", "planner.shape=scp"]))

@@ -26,6 +26,12 @@ _TIE = 1.0 + 1e-6  # inflation of the heuristic: prefers the deeper of equal nod
 _BELOW_LIMIT = 20.0  # extra penalty of a cell below the limit, next to a start that is there too
 
 
+@nb.njit(cache=True, inline="always")
+def _octile(di: int, dj: int, dk: int) -> float:
+    """Rounded from the exact differences; the order of equal keys hangs on the last bit."""
+    return float(octile(di, dj, dk, 0.41421356237309503, 0.3178372451957822))
+
+
 class Rule(NamedTuple):
     """What a clearance is worth."""
 
@@ -143,7 +149,7 @@ def plan_columns(space: Space, generation: int, columns: Nodes, clearance: Float
     nj = j1 - j0 + 1
     source = (goal[0] - i0) * nj + goal[1] - j0
     target = (start[0] - i0) * nj + start[1] - j0
-    _begin(columns, source, octile(goal[0] - start[0], goal[1] - start[1], 0), generation)
+    _begin(columns, source, _octile(goal[0] - start[0], goal[1] - start[1], 0), generation)
     clearance[source] = _best_clearance(space, goal[0], goal[1])
     size, expansions = 1, 0
     while size > 0:
@@ -169,7 +175,7 @@ def plan_columns(space: Space, generation: int, columns: Nodes, clearance: Float
                 step = 1.4142135623730951 if i != ci and j != cj else 1.0
                 there = columns.cost[cell] + step * (1.0 + 0.5 * (here + _penalty(clearance[other], rule)))
                 if there < columns.cost[other]:
-                    key = there + octile(i - start[0], j - start[1], 0)
+                    key = there + _octile(i - start[0], j - start[1], 0)
                     size = _improve(columns, size, other, there, key)
     return NO_PATH, np.inf, expansions
 
@@ -229,7 +235,7 @@ def plan_cells(
             if there < cells.cost[other]:
                 column = (i - i0) * nj + j - j0
                 bound = _planar_bound(columns, column, generation, planar_total, i - start[0], j - start[1])
-                bound = max(octile(i - goal[0], j - goal[1], k - goal[2]), bound)
+                bound = max(_octile(i - goal[0], j - goal[1], k - goal[2]), bound)
                 size = _improve(cells, size, other, there, there + _TIE * bound)
                 parent[other] = n
     return NO_PATH, np.inf, expansions
@@ -242,7 +248,7 @@ def _planar_bound(
     """Lower bound on the cost from a column, (di, dj) from the start, to the goal, voxels."""
     if columns.stamp[column] == generation and columns.place[column] == _CLOSED:
         return float(columns.cost[column])
-    return float(planar_total - octile(di, dj, 0))
+    return float(planar_total - _octile(di, dj, 0))
 
 
 @nb.njit(cache=True, inline="always")

@@ -6,9 +6,19 @@ import numba as nb
 
 
 @nb.njit(cache=True, inline="always")
-def octile(di: int, dj: int, dk: int) -> float:
-    """Length of the shortest voxel path over (di, dj, dk) in free space, voxels."""
+def octile(
+    di: int, dj: int, dk: int, edge: float = 0.41421356237309515, corner: float = 0.31783724519578205
+) -> float:
+    """Length of the shortest voxel path over (di, dj, dk) in free space, voxels.
+
+    Args:
+        di: voxels along x.
+        dj: along y.
+        dk: along z.
+        edge: √2 - 1; by default rounded as the difference of the steps' rounded lengths.
+        corner: √3 - √2, likewise.
+    """
     a, b, c = abs(di), abs(dj), abs(dk)
     least, most = min(a, b, c), max(a, b, c)
     middle = a + b + c - least - most
-    return most + 0.41421356237309503 * middle + 0.3178372451957822 * least
+    return most + edge * middle + corner * least

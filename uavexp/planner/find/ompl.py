@@ -13,7 +13,8 @@ from uavexp.planner.constraints import Constraints
 from uavexp.planner.find.base import FoundPath
 from uavexp.planner.find.ends import refusal
 from uavexp.planner.find.free_space import space_of
-from uavexp.planner.find.ompl_server import Query, search_with_ompl
+from uavexp.planner.find.ompl_search import Query
+from uavexp.planner.find.ompl_server import search_with_ompl
 from uavexp.types import PlanRequest, PlanStatus
 
 

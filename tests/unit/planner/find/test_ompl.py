@@ -19,7 +19,8 @@ from uavexp.planner.find import ompl_server
 from uavexp.planner.find.free_space import FreeSpace, free_space, straight_is_free
 from uavexp.planner.find.ompl_bitstar import OmplBitstar
 from uavexp.planner.find.ompl_rrtstar import OmplRrtstar
-from uavexp.planner.find.ompl_server import Query, search_with_ompl
+from uavexp.planner.find.ompl_search import Query
+from uavexp.planner.find.ompl_server import search_with_ompl
 from uavexp.types import Goal, Limits, PlanRequest, PlanStatus
 
 pytest.importorskip("ompl")

@@ -22,7 +22,7 @@ import numpy as np
 
 from uavexp.arrays import Float, Int
 from uavexp.planner.find.batch_tree.edges import Rule, bound, corners_fit, cost, fits
-from uavexp.planner.find.batch_tree.informed import draw, draw_near, sampled_region
+from uavexp.planner.find.batch_tree.informed import Region, draw, draw_near, sampled_region
 from uavexp.planner.find.batch_tree.neighbours import (
     Neighbours,
     neighbours_within,
@@ -109,9 +109,6 @@ def search(
     serial, iterations, checks, samples = count, 0, 0, 0
     history = [(0.0, 0.0)]
     history.clear()
-    state = np.empty(6)
-    top_mps = rule.top_mps if rule.kinodynamic else 0.0
-    spread_mps = _VELOCITY_SPREAD * top_mps
     solved = 0  # batches with a solution before them
     for batch in range(budget.first_batches + budget.batches):
         best = tree.cost[GOAL]
@@ -120,23 +117,8 @@ def search(
         solved += np.isfinite(best)
         count = prune(tree, count)
         region = sampled_region(space, start, goal, best * (rule.top_mps if rule.kinodynamic else 1.0))
-        solution = path_to(tree, GOAL)
-        drawn = free = 0
-        for n in range(budget.batch_samples):
-            local = np.isfinite(best) and n < budget.local_share * budget.batch_samples
-            for _ in range(_TRIES):
-                if local:
-                    kept = draw_near(space, region, solution, budget.local_spread_m, spread_mps, rng, state)
-                else:
-                    kept = draw(space, region, top_mps, rng, state)
-                checks += 1
-                drawn += not local
-                from_start, to_goal = bound(rule, start, state), bound(rule, state, goal)
-                if kept and from_start + to_goal < best:
-                    add(tree, count, state, serial, batch, from_start, to_goal)
-                    count, serial, samples = count + 1, serial + 1, samples + 1
-                    free += not local
-                    break
+        added, free, drawn, looked = _add_batch(tree, count, serial, batch, space, region, rule, budget, rng)
+        count, serial, samples, checks = count + added, serial + added, samples + added, checks + looked
         measure = region.volume_m3 * free / max(drawn, 1)
         radius = radius_of(count, measure, 6 if rule.kinodynamic else 3, budget.rewire_factor)
         radius = max(min(radius, rule.longest_m), reach_m if batch == 0 else 0.0)
@@ -152,6 +134,46 @@ def search(
     for n in range(len(history)):
         record[n, 0], record[n, 1] = history[n]
     return Found(path, steps, record, iterations, checks, samples, edges_of(tree, count))
+
+
+@nb.njit(cache=True)
+def _add_batch(
+    tree: Tree,
+    count: int,
+    serial: int,
+    batch: int,
+    space: FreeSpace,
+    region: Region,
+    rule: Rule,
+    budget: Budget,
+    rng: np.random.Generator,
+) -> tuple[int, int, int, int]:
+    """Draw a batch of samples that may better the solution.
+
+    Returns:
+        How many; of the draws from the whole region, those kept and all of them; looks at the map.
+    """
+    best, start, goal = tree.cost[GOAL], tree.state[START], tree.state[GOAL]
+    top_mps = rule.top_mps if rule.kinodynamic else 0.0
+    spread_mps = _VELOCITY_SPREAD * top_mps
+    solution, state = path_to(tree, GOAL), np.empty(6)
+    added, drawn, free, checks = 0, 0, 0, 0
+    for n in range(budget.batch_samples):
+        local = np.isfinite(best) and n < budget.local_share * budget.batch_samples
+        for _ in range(_TRIES):
+            if local:
+                kept = draw_near(space, region, solution, budget.local_spread_m, spread_mps, rng, state)
+            else:
+                kept = draw(space, region, top_mps, rng, state)
+            checks += 1
+            drawn += not local
+            from_start, to_goal = bound(rule, start, state), bound(rule, state, goal)
+            if kept and from_start + to_goal < best:
+                add(tree, count + added, state, serial + added, batch, from_start, to_goal)
+                added += 1
+                free += not local
+                break
+    return added, free, drawn, checks
 
 
 @nb.njit(cache=True)

@@ -13,6 +13,8 @@ answer:
 
 from __future__ import annotations
 
+from typing import Any
+
 import numba as nb
 import numpy as np
 import numpy.typing as npt
@@ -47,10 +49,75 @@ def _slot(shape: Int, i: int, j: int, k: int) -> int:
 
 
 @nb.njit(cache=True)
-def _grown(array: Record) -> Record:
+def grown(array: Record) -> Record:
+    """The array, twice as long."""
     larger = np.empty(2 * array.shape[0], dtype=array.dtype)
     larger[: array.shape[0]] = array
     return larger
+
+
+@nb.njit(cache=True, inline="always")
+def _leap(terrain: Terrain, goal: tuple[int, int, int], n: int, i: int, j: int, k: int) -> int:
+    """Cells that move n goes: a straight one to where a path can turn, or to the goal; 0: nowhere."""
+    si, sj, sk = STEPS[n, 0], STEPS[n, 1], STEPS[n, 2]
+    if si * si + sj * sj + sk * sk != 1:
+        return 1
+    count, goes_on = run_length(terrain.stops, terrain.first, terrain.shape, n, i, j, k)
+    away = (goal[0] - i) * si + (goal[1] - j) * sj + (goal[2] - k) * sk
+    reached = i + away * si == goal[0] and j + away * sj == goal[1] and k + away * sk == goal[2]
+    if 0 < away <= count and reached:
+        return int(away)
+    return int(count) if goes_on else 0
+
+
+@nb.njit(cache=True, inline="always")
+def _moves(terrain: Terrain, arrived: int, i: int, j: int, k: int) -> int:
+    """Canonical moves from a cell, bits."""
+    bits = FULL
+    if is_near(terrain.near, terrain.shape, i, j, k):
+        bits = neighbourhood(terrain.free, terrain.shape, i, j, k)
+    return int(remembered_moves(terrain.keys, terrain.known, arrived, bits))
+
+
+@nb.njit(cache=True, inline="always")
+def _push(stack: Int32, entry_of: Record, entries: int, rank: int, node: int) -> tuple[Int32, Record]:
+    """Put a node on the stack of its rank; returns the arrays, which may have grown."""
+    while rank >= stack.shape[0]:
+        stack = np.concatenate((stack, np.full_like(stack, -1)))
+    if entries == entry_of.shape[0]:
+        entry_of = grown(entry_of)
+    entry_of[entries].node, entry_of[entries].below = node, stack[rank]
+    stack[rank] = entries
+    return stack, entry_of
+
+
+@nb.njit(cache=True, inline="always")
+def _with_node(node_of: Record, nodes: int, cell: int) -> Record:
+    """The nodes with one of a cell not seen before."""
+    if nodes == node_of.shape[0]:
+        node_of = grown(node_of)
+    node_of[nodes].cell = cell
+    return node_of
+
+
+@nb.njit(cache=True, inline="always")
+def _reach(node: Any, cost: float, parent: int, arrived: int) -> None:
+    node.cost, node.closed, node.parent, node.arrived = cost, False, parent, arrived
+
+
+@nb.njit(cache=True, inline="always")
+def _begin(node_of: Record, entry_of: Record, stack: Int32, slot: Int32, source: int, place: int) -> None:
+    """One node, on the first stack."""
+    node_of[0].cell, slot[place] = source, 0
+    _reach(node_of[0], 0.0, -1, 13)
+    entry_of[0].node, entry_of[0].below, stack[0] = 0, -1, 0
+
+
+@nb.njit(cache=True, inline="always")
+def _index(cell: int, row: int, slab: int) -> tuple[int, int, int]:
+    i = cell // slab
+    j = (cell - i * slab) // row
+    return i, j, cell - i * slab - j * row
 
 
 @nb.njit(cache=True)
@@ -59,101 +126,58 @@ def find(
 ) -> tuple[int, float, int, Int32]:
     """Return status, cost in voxels, expansions and the path's cells (P, 3).
 
-    Args:
-        terrain: the grid.
-        start: padded index (3,), free.
-        goal: padded index (3,), free.
-        max_expansions: budget.
-        slot: scratch (cells,), any contents.
+    Ends are padded indices (3,) of free cells; `slot` (cells,) is scratch of any contents.
     """
-    shape, free, near, stops, first, keys, known = terrain
-    full = FULL
-    row, slab = shape[2], shape[1] * shape[2]
-    goal_i, goal_j, goal_k = goal[0], goal[1], goal[2]
-    source = start[0] * slab + start[1] * row + start[2]
-    target = goal[0] * slab + goal[1] * row + goal[2]
+    shape, row, slab = terrain.shape, terrain.shape[2], terrain.shape[1] * terrain.shape[2]
+    end = (goal[0], goal[1], goal[2])
+    source, target = start[0] * slab + start[1] * row + start[2], end[0] * slab + end[1] * row + end[2]
     node_of, entry_of = np.empty(_FIRST_NODES, dtype=_NODE), np.empty(_FIRST_NODES, dtype=_ENTRY)
     stack = np.full(1024, -1, dtype=np.int32)  # top entry of each
-    least = octile(start[0] - goal[0], start[1] - goal[1], start[2] - goal[2])
-    origin = node_of[0]
-    origin.cell, origin.cost, origin.parent, origin.arrived, origin.closed = source, 0.0, -1, 13, False
-    slot[_slot(shape, start[0], start[1], start[2])] = 0
-    entry_of[0].node, entry_of[0].below, stack[0] = 0, -1, 0
+    _begin(node_of, entry_of, stack, slot, source, _slot(shape, start[0], start[1], start[2]))
+    least = octile(start[0] - end[0], start[1] - end[1], start[2] - end[2])
     nodes, entries, expansions, level, highest = 1, 1, 0, 0, 0
-    best, last = np.inf, -1
+    best, last = (0.0, 0) if source == target else (np.inf, -1)
     while level <= highest and least + level / _PER_VOXEL < best - _SAME:
         top = stack[level]
         if top < 0:
             level += 1
             continue
-        stack[level] = entry_of[top].below
-        node = entry_of[top].node
+        stack[level], node = entry_of[top].below, entry_of[top].node
         if node_of[node].closed:
             continue
         node_of[node].closed = True
         cell, cost, arrived = node_of[node].cell, node_of[node].cost, node_of[node].arrived
-        ci = cell // slab
-        cj = (cell - ci * slab) // row
-        ck = cell - ci * slab - cj * row
-        if cost + octile(ci - goal_i, cj - goal_j, ck - goal_k) >= best - _SAME:
+        ci, cj, ck = _index(cell, row, slab)
+        if cost + octile(ci - end[0], cj - end[1], ck - end[2]) >= best - _SAME:
             continue
         if expansions >= max_expansions:
             return BUDGET, np.inf, expansions, np.empty((0, 3), dtype=np.int32)
         expansions += 1
-        bits = full
-        if is_near(near, shape, ci, cj, ck):
-            bits = neighbourhood(free, shape, ci, cj, ck)
-        moves = remembered_moves(keys, known, arrived, bits)
-        n = -1
+        moves, n = _moves(terrain, arrived, ci, cj, ck), -1
         while moves != 0:
-            n += 1
-            if moves & 1 == 0:
-                moves >>= 1
+            n, taken, moves = n + 1, moves & 1, moves >> 1
+            count = _leap(terrain, end, n, ci, cj, ck) if taken else 0
+            if count == 0:
                 continue
-            moves >>= 1
-            si, sj, sk = STEPS[n, 0], STEPS[n, 1], STEPS[n, 2]
-            step = si * slab + sj * row + sk
-            count, goes_on = 1, True
-            if si * si + sj * sj + sk * sk == 1:
-                count, goes_on = run_length(stops, first, shape, n, ci, cj, ck)
-                away = (goal_i - ci) * si + (goal_j - cj) * sj + (goal_k - ck) * sk
-                if 0 < away <= count and cell + away * step == target:
-                    count, goes_on = away, True
-                if not goes_on:
-                    continue
-            other = cell + count * step
             there = cost + count * LENGTHS[n]
-            oi, oj, ok = ci + count * si, cj + count * sj, ck + count * sk
-            ahead = octile(oi - goal_i, oj - goal_j, ok - goal_k)
+            oi, oj, ok = ci + count * STEPS[n, 0], cj + count * STEPS[n, 1], ck + count * STEPS[n, 2]
+            ahead = octile(oi - end[0], oj - end[1], ok - end[2])
             if there + ahead >= best - _SAME:
                 continue
-            place = _slot(shape, oi, oj, ok)
+            other, place = oi * slab + oj * row + ok, _slot(shape, oi, oj, ok)
             new = slot[place]
             if not (0 <= new < nodes and node_of[new].cell == other):
-                if nodes == node_of.shape[0]:
-                    node_of = _grown(node_of)
-                new = nodes
+                node_of, new, slot[place] = _with_node(node_of, nodes, other), nodes, nodes
                 nodes += 1
-                slot[place] = new
-                node_of[new].cell = other
             elif there >= node_of[new].cost - _SAME:
                 continue
-            node_of[new].cost, node_of[new].closed = there, False
-            node_of[new].parent, node_of[new].arrived = node, n
+            _reach(node_of[new], there, node, n)
             if other == target:
                 best, last = there, new
                 continue
             rank = max(int((there + ahead - least) * _PER_VOXEL), level)
-            while rank >= stack.shape[0]:
-                stack = np.concatenate((stack, np.full_like(stack, -1)))
-            if entries == entry_of.shape[0]:
-                entry_of = _grown(entry_of)
-            entry_of[entries].node, entry_of[entries].below = new, stack[rank]
-            stack[rank] = entries
-            entries += 1
-            highest = max(highest, rank)
-    if source == target:
-        best, last = 0.0, 0
+            stack, entry_of = _push(stack, entry_of, entries, rank, new)
+            entries, highest = entries + 1, max(highest, rank)
     if last < 0:
         return NO_PATH, np.inf, expansions, np.empty((0, 3), dtype=np.int32)
     return FOUND, best, expansions, _trace(last, node_of, row, slab)

@@ -20,9 +20,9 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
-from uavexp.arrays import Bool, Float, Int, Int32, UInt8
+from uavexp.arrays import Float, Int, Int32, UInt8
 from uavexp.planner.find.octile import octile
-from uavexp.planner.find.voxels.canonical import BUDGET, FOUND, NO_PATH
+from uavexp.planner.find.voxels.canonical import BUDGET, FOUND, NO_PATH, Record, grown
 from uavexp.planner.find.voxels.jump import neighbourhood
 from uavexp.planner.find.voxels.moves import LENGTHS, STEPS, open_moves
 
@@ -31,6 +31,18 @@ COUNT_MADE, COUNT_OPEN = 0, 1  # readings of N_horizontal
 LEVEL_STEPS = 5  # N_horizontal that allows a vertical step
 _GOAL_BAND = 2  # voxels of height around the goal within which vertical steps are suppressed
 _FIRST_NODES = 4096
+_NODE = np.dtype(
+    [
+        ("key", "i8"),
+        ("cell", "i8"),
+        ("cost", "f8"),
+        ("parent", "i8"),
+        ("arrived", "i1"),
+        ("made", "i1"),
+        ("closed", "b1"),
+    ],
+    align=True,
+)
 COSINE: Float = np.divide(STEPS @ STEPS.T, np.outer(LENGTHS, LENGTHS), where=np.outer(LENGTHS, LENGTHS) > 0.0,
                           out=np.ones((27, 27)))  # fmt: skip
 LEVEL = int(sum(1 << n for n in range(27) if STEPS[n, 2] == 0 and n != 13))  # bits of the level moves
@@ -63,21 +75,21 @@ def _may_climb(rule: int, reading: int, moves: int, height: int, made: int) -> b
 
 
 @nb.njit(cache=True)
-def _place(table: Int, key_of: Int, key: int) -> int:
+def _place(table: Int, node_of: Record, key: int) -> int:
     """Place of a key in the hash table (node numbers, -1 where empty), or where it would go."""
     mask = table.shape[0] - 1
     place = (key * 0x9E3779B1 >> 12) & mask
-    while table[place] >= 0 and key_of[table[place]] != key:
+    while table[place] >= 0 and node_of[table[place]].key != key:
         place = (place + 1) & mask
     return int(place)
 
 
 @nb.njit(cache=True)
-def _is_dominated(table: Int, key_of: Int, closed: Bool, key: int, made: int) -> bool:
+def _is_dominated(table: Int, node_of: Record, key: int, made: int) -> bool:
     """Whether the same cell and step were closed before, at no greater cost, with more level steps made."""
     for more in range(1, 6 - made):
-        other = table[_place(table, key_of, key + more)]
-        if other >= 0 and closed[other]:
+        other = table[_place(table, node_of, key + more)]
+        if other >= 0 and node_of[other].closed:
             return True
     return False
 
@@ -123,99 +135,70 @@ def _longer(array: Int) -> Int:
 
 
 @nb.njit(cache=True)
+def _with_node(table: Int, node_of: Record, nodes: int, key: int) -> tuple[Int, Record]:
+    """Table and nodes, where need be twice as long, with the next node under a new key."""
+    if nodes == node_of.shape[0]:
+        table, node_of = np.full(2 * table.shape[0], -1, dtype=np.int64), grown(node_of)
+        for node in range(nodes):
+            table[_place(table, node_of, node_of[node].key)] = node
+    table[_place(table, node_of, key)] = nodes
+    return table, node_of
+
+
+@nb.njit(cache=True)
 def find_directed(
-    free: UInt8,
-    shape: Int,
-    start: Int,
-    goal: Int,
-    exact: bool,
-    turn_weight: float,
-    first_costs: Float,
-    rule: int,
-    reading: int,
-    max_expansions: int,
-) -> tuple[int, float, int, Int32]:
+    free: UInt8, shape: Int, start: Int, goal: Int, exact: bool, turn_weight: float, first_costs: Float,
+    rule: int, reading: int, max_expansions: int,
+) -> tuple[int, float, int, Int32]:  # fmt: skip
     """Return status, objective in voxels (paper: length and first cost), expansions, cells (P, 3).
 
-    Args:
-        free: bits of the padded grid (`jump.Terrain`).
-        shape: of the padded grid (3,).
-        start: padded index (3,), free.
-        goal: padded index (3,), free.
-        exact: exact form, else the paper's.
-        turn_weight: λ, voxels.
-        first_costs: of each move (27,) as the first one, voxels.
-        rule: for vertical steps.
-        reading: of N_horizontal.
-        max_expansions: budget.
+    `free` is bits of the padded grid of this shape (3,) (`jump.Terrain`), ends are padded indices of free
+    cells, `turn_weight` and `first_costs`, of each move (27,) as the first one, are in voxels.
     """
     row, slab = shape[2], shape[1] * shape[2]
     source = start[0] * slab + start[1] * row + start[2]
     target = goal[0] * slab + goal[1] * row + goal[2]
     counts = exact and rule != 0 and reading == 0
-    table = np.full(4 * _FIRST_NODES, -1, dtype=np.int64)
-    key_of = np.empty(_FIRST_NODES, dtype=np.int64)
-    cell_of = np.empty(_FIRST_NODES, dtype=np.int64)
-    cost = np.empty(_FIRST_NODES)
-    parent = np.empty(_FIRST_NODES, dtype=np.int64)
-    arrived = np.empty(_FIRST_NODES, dtype=np.int8)
-    made = np.empty(_FIRST_NODES, dtype=np.int8)
-    closed = np.empty(_FIRST_NODES, dtype=np.bool_)
+    table, node_of = np.full(4 * _FIRST_NODES, -1, dtype=np.int64), np.empty(_FIRST_NODES, dtype=_NODE)
     heap_f, heap_node = np.empty(_FIRST_NODES), np.empty(_FIRST_NODES, dtype=np.int64)
     key = (source * 27 + 13) * 6 if exact else source
-    table[_place(table, key_of, key)] = 0
-    key_of[0], cell_of[0], cost[0], parent[0] = key, source, 0.0, -1
-    arrived[0], made[0], closed[0] = 13, 0, False
-    size = _push(heap_f, heap_node, 0, 0.0, 0)
-    nodes, expansions = 1, 0
+    table[_place(table, node_of, key)] = 0
+    _write(node_of, 0, key, source, 0.0, -1, 13, 0)
+    nodes, expansions, size = 1, 0, _push(heap_f, heap_node, 0, 0.0, 0)
     while size > 0:
         node = heap_node[0]
         size = _pop(heap_f, heap_node, size)
-        if closed[node]:
+        if node_of[node].closed:
             continue
-        closed[node] = True
-        if counts and _is_dominated(table, key_of, closed, key_of[node], made[node]):
+        node_of[node].closed = True
+        cell, cost, made = node_of[node].cell, node_of[node].cost, node_of[node].made
+        if counts and _is_dominated(table, node_of, node_of[node].key, made):
             continue
-        cell = cell_of[node]
         if cell == target:
-            return FOUND, cost[node], expansions, _trace(node, cell_of, parent, row, slab)
+            return FOUND, cost, expansions, _trace(node, node_of, row, slab)
         if expansions >= max_expansions:
             return BUDGET, np.inf, expansions, np.empty((0, 3), dtype=np.int32)
         expansions += 1
-        ci, cj, ck = cell // slab, cell % slab // row, cell % row
-        before = arrived[node]
+        ci, cj, ck, before = cell // slab, cell % slab // row, cell % row, node_of[node].arrived
         moves = open_moves(neighbourhood(free, shape, ci, cj, ck))
-        if not _may_climb(rule, reading, moves, ck - goal[2], made[node]):
+        if not _may_climb(rule, reading, moves, ck - goal[2], made):
             moves &= LEVEL
         for n in range(27):
             if not moves >> n & 1:
                 continue
             other = cell + STEPS[n, 0] * slab + STEPS[n, 1] * row + STEPS[n, 2]
-            steps = 0 if STEPS[n, 2] != 0 else min(made[node] + 1, 5)
-            key = other
-            if exact:
-                key = (other * 27 + n) * 6 + (steps if counts else 0)
+            steps = 0 if STEPS[n, 2] != 0 else min(made + 1, 5)
+            key = (other * 27 + n) * 6 + (steps if counts else 0) if exact else other
             penalty = 0.0 if before == 13 else turn_weight * (1.0 - COSINE[before, n])
-            there = cost[node] + LENGTHS[n] + (first_costs[n] if before == 13 else 0.0)
-            if exact:
-                there += penalty
-            place = _place(table, key_of, key)
-            new = table[place]
-            if new >= 0 and (closed[new] or there >= cost[new] - 1e-9):
+            there = cost + LENGTHS[n] + (first_costs[n] if before == 13 else 0.0)
+            there += penalty if exact else 0.0
+            new = table[_place(table, node_of, key)]
+            if new >= 0 and (node_of[new].closed or there >= node_of[new].cost - 1e-9):
                 continue
             if new < 0:
-                if nodes == cost.shape[0]:
-                    key_of, cell_of, parent = _longer(key_of), _longer(cell_of), _longer(parent)
-                    cost, closed = _longer(cost), _longer(closed)
-                    arrived, made = _longer(arrived), _longer(made)
-                    table = np.full(2 * table.shape[0], -1, dtype=np.int64)
-                    for old in range(nodes):
-                        table[_place(table, key_of, key_of[old])] = old
-                    place = _place(table, key_of, key)
-                new = nodes
-                nodes += 1
-                table[place], key_of[new], cell_of[new], closed[new] = new, key, other, False
-            cost[new], parent[new], arrived[new], made[new] = there, node, n, steps
+                table, node_of = _with_node(table, node_of, nodes, key)
+                new, nodes = nodes, nodes + 1
+            _write(node_of, new, key, other, there, node, n, steps)
             ahead = octile(ci + STEPS[n, 0] - goal[0], cj + STEPS[n, 1] - goal[1], ck + STEPS[n, 2] - goal[2])
             f = there + ahead * (1.0 + 1e-9) + (0.0 if exact else penalty)  # ties: towards the goal
             if size == heap_f.shape[0]:
@@ -224,16 +207,27 @@ def find_directed(
     return NO_PATH, np.inf, expansions, np.empty((0, 3), dtype=np.int32)
 
 
+@nb.njit(cache=True, inline="always")
+def _write(
+    node_of: Record, node: int, key: int, cell: int, cost: float, parent: int, arrived: int, made: int
+) -> None:
+    """An open node."""
+    node_of[node].key, node_of[node].cell, node_of[node].cost = key, cell, cost
+    node_of[node].parent, node_of[node].arrived = parent, arrived
+    node_of[node].made, node_of[node].closed = made, False
+
+
 @nb.njit(cache=True)
-def _trace(last: int, cell_of: Int, parent: Int, row: int, slab: int) -> Int32:
+def _trace(last: int, node_of: Record, row: int, slab: int) -> Int32:
+    """Cells (P, 3) of the path to a node."""
     count, node = 0, last
     while node >= 0:
         count += 1
-        node = parent[node]
+        node = node_of[node].parent
     path = np.empty((count, 3), dtype=np.int32)
     node = last
     for at in range(count - 1, -1, -1):
-        cell = cell_of[node]
+        cell = node_of[node].cell
         path[at, 0], path[at, 1], path[at, 2] = cell // slab, cell % slab // row, cell % row
-        node = parent[node]
+        node = node_of[node].parent
     return path
