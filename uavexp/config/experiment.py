@@ -23,6 +23,7 @@ nowhere else, and any other key holds for every cell.
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -77,8 +78,9 @@ def list_experiments(user_folder: Path | None = None) -> dict[str, Path]:
 
 
 def title_of(name: str, file: Path) -> str:
-    """Title of an experiment; nothing else of it is looked at."""
-    return str(_load(name, file).get("title", name))
+    """Title of an experiment, from its text; nothing else of it is looked at."""
+    match = re.search(r"^title:\s*(.*?)\s*$", file.read_text(encoding="utf-8"), re.MULTILINE)
+    return match[1].strip("\"'") if match else name
 
 
 def read_experiment(name: str, file: Path, *, borrow: bool = True) -> Experiment:
