@@ -19,6 +19,7 @@ from uavexp.report.statistics import LEVEL, Interval, Labels
 Alternative = Literal["two-sided", "greater", "less"]
 
 ALPHA = 0.05
+_MOST_RANKED = 13  # pairs: exact with ties, too, which SciPy permutes one by one
 _MOST_FLIPPED = 20  # all 2**20 patterns of signs are listed; above, their normal limit
 
 
@@ -63,10 +64,14 @@ def sign_flip_p(differences: Float, cluster: Labels, alternative: Alternative = 
     if means.size > _MOST_FLIPPED:
         z = observed / math.sqrt(float(means @ means))
         return float(2.0 * stats.norm.sf(abs(z)) if alternative == "two-sided" else stats.norm.sf(z))
-    sums = np.zeros(1)
-    for mean in means:
+    if not means.size:
+        return 1.0
+    two_sided = alternative == "two-sided"
+    # of the patterns with the first sign turned, too, the sums are the same with the other sign
+    sums, others = (means[:1], means[1:]) if two_sided else (np.zeros(1), means)
+    for mean in others:
         sums = np.concatenate([sums + mean, sums - mean])
-    if alternative == "two-sided":
+    if two_sided:
         sums, observed = np.abs(sums), abs(observed)
     rounding = 1e-9 * float(np.abs(means).sum())
     return float(np.mean(sums >= observed - rounding))
@@ -104,7 +109,10 @@ def wilcoxon_p(differences: Float) -> float:
     if not differences.size:
         return math.nan
     differences = differences[differences != 0.0]
-    return float(stats.wilcoxon(differences).pvalue) if differences.size else 1.0
+    if differences.size <= _MOST_RANKED:
+        signed = stats.rankdata(np.abs(differences)) * np.sign(differences)
+        return sign_flip_p(signed, np.arange(signed.size)) if signed.size else 1.0
+    return float(stats.wilcoxon(differences).pvalue)
 
 
 def holm(p_values: Float) -> Float:

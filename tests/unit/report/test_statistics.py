@@ -228,3 +228,10 @@ def test_percentiles_of_a_normal_bootstrap_give_students_interval(units: int) ->
     low, high = statistics.percentile_interval(bootstrap, units)
     student = stats.t.ppf(0.975, units - 1) * math.sqrt(units / (units - 1))
     assert (low[0], high[0]) == pytest.approx((-student, student), rel=2e-3)
+
+
+@pytest.mark.parametrize("differences", [[1.0, -1.0, 2.0, 2.0, 3.0], [0.5, 1.5, -2.5, 4.0], [0.0, 2.0, 2.0]])
+def test_wilcoxons_test_of_few_pairs_is_scipys_with_ties_or_without(differences: list[float]) -> None:
+    values = np.array(differences)
+    expected = stats.wilcoxon(values[values != 0.0]).pvalue
+    assert significance.wilcoxon_p(values) == pytest.approx(expected)
