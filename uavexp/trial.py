@@ -11,7 +11,7 @@ import numpy as np
 from uavexp.controller.base import Controller
 from uavexp.detection.base import Detection
 from uavexp.errors import require
-from uavexp.estimator.base import Estimator
+from uavexp.estimator.base import Believe, Estimator
 from uavexp.explorer.base import Explorer
 from uavexp.geometry import quaternion_from_yaw
 from uavexp.log import TrialLog
@@ -154,7 +154,7 @@ def fly(parts: Parts, world: World, seed: int, progress: Progress | None = None)
             state, touched = flight.contact.advance(state, moved, time_s + parts.step_s)
             if touched:
                 parts.vehicle.place(state)
-        estimate = parts.estimator.estimate(state, parts.step_s)
+        estimate = flight.believe(state, parts.step_s)
         if progress is not None and step % _LOOK_STEPS == 0:
             progress(time_s, f"{len(pilot.replans)} plans")
     return flight.log(outcome or Outcome.TIMEOUT)
@@ -168,6 +168,7 @@ class _Flight:
     world: World
     scene: Scene
     pilot: Piloting
+    believe: Believe
     contact: ContactTracker
     recorder: Recorder
     watch: Stopwatch
@@ -243,14 +244,12 @@ def _begin(parts: Parts, world: World, seed: int) -> _Flight:
     parts.movers.reset(world, scene, limits, generator(seed, Stream.MOVERS))
     parts.detection.reset(limits, generator(seed, Stream.DETECTION))
     parts.sensor.reset(scene, generator(seed, Stream.SENSOR))
-    parts.estimator.reset(generator(seed, Stream.ESTIMATOR))
     parts.mapping.reset(world.bounds_m, scene)
     parts.mapping.mark_free(world.start_m, parts.start_bubble_m)
     parts.trigger.reset(limits)
     parts.planner.reset(limits, generator(seed, Stream.PLANNER))
     parts.controller.reset(limits, parts.vehicle.mass_kg)
     parts.vehicle.reset(_hover(world))
-    parts.safety.reset(limits)
     with watch.lap("mission"):
         parts.mission.reset(world, scene, limits)
     guide = parts.mission.guide(parts.explorer)
@@ -259,7 +258,7 @@ def _begin(parts: Parts, world: World, seed: int) -> _Flight:
         explorer=guide,
         trigger=parts.trigger,
         planner=parts.planner,
-        safety=parts.safety,
+        must_brake=parts.safety.begin(limits),
         limits=limits,
         latency_s=parts.latency_s,
         start_m=world.start_m.copy(),
@@ -272,6 +271,7 @@ def _begin(parts: Parts, world: World, seed: int) -> _Flight:
         world=world,
         scene=scene,
         pilot=parts.pilot.begin(crew),
+        believe=parts.estimator.begin(generator(seed, Stream.ESTIMATOR)),
         contact=ContactTracker(scene=scene, body_size_m=limits.body_size_m),
         recorder=Recorder(),
         watch=watch,

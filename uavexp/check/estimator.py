@@ -20,9 +20,8 @@ _TRUTH = State(
 
 
 def _believed(make: Make, seed: int, steps: int = 200) -> list[State]:
-    estimator = make()
-    estimator.reset(generator(seed, Stream.ESTIMATOR))
-    return [estimator.estimate(_moved(step), _STEP_S) for step in range(steps)]
+    believe = make().begin(generator(seed, Stream.ESTIMATOR))
+    return [believe(_moved(step), _STEP_S) for step in range(steps)]
 
 
 def _moved(steps: int) -> State:
@@ -44,18 +43,16 @@ def believes_in_an_attitude(make: Make) -> None:
 
 
 def gives_the_same_estimates_for_the_same_seed(make: Make) -> None:
-    """To the last bit, also after a reset."""
+    """To the last bit, also after another trial."""
     used = make()
-    used.reset(generator(4, Stream.ESTIMATOR))
-    used.estimate(_TRUTH, _STEP_S)
+    used.begin(generator(4, Stream.ESTIMATOR))(_TRUTH, _STEP_S)
     once, again = _believed(make, 3), _believed(lambda: used, 3)
     keep(same(once, again), f"step {sum(map(same, once, again))} of 200 differs in a second trial")
 
 
 def writes_into_nothing_it_is_given(make: Make) -> None:
     """The truth stays the truth."""
-    estimator = make()
-    estimator.reset(generator(0, Stream.ESTIMATOR))
+    believe = make().begin(generator(0, Stream.ESTIMATOR))
     with untouched(truth=_TRUTH):
         for _ in range(5):
-            estimator.estimate(_TRUTH, _STEP_S)
+            believe(_TRUTH, _STEP_S)

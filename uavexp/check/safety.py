@@ -11,8 +11,8 @@ from uavexp.types import Observation
 
 
 def _answers(safety: Any, seen: tuple[Observation, ...]) -> list[bool]:
-    safety.reset(LIMITS)
-    return [safety.must_brake(observation) for observation in seen]
+    must_brake = safety.begin(LIMITS)
+    return [must_brake(observation) for observation in seen]
 
 
 def _keep_same(have: list[bool], want: list[bool], where: str) -> None:
@@ -43,7 +43,7 @@ def has_nothing_to_stop_before_there_is_a_plan(make: Make) -> None:
     keep(not answer, "it brakes before the first plan")
 
 
-def forgets_the_last_trial_at_a_reset(make: Make) -> None:
+def begins_every_trial_anew(make: Make) -> None:
     """The second flight of one object is the first of another."""
     used = make()
     _answers(used, flight())
@@ -58,8 +58,7 @@ def decides_the_same_wherever_the_world_stands(make: Make) -> None:
 
 def writes_into_nothing_it_is_given(make: Make) -> None:
     """Map, plan and observation are the trial's own."""
-    safety = make()
-    safety.reset(LIMITS)
+    must_brake = make().begin(LIMITS)
     for observation in flight():
         with untouched(observation=observation):
-            safety.must_brake(observation)
+            must_brake(observation)

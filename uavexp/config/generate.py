@@ -122,6 +122,6 @@ def _place(cls: type) -> Path:
 
 if __name__ == "__main__":
     for target in sys.argv[1:]:
-        sys.stdout.write(option_yaml(component_class("", target)))
+        sys.stdout.write(option_yaml(component_class(target.split(".")[1], target)))
     for path, text in option_files().items() if not sys.argv[1:] else ():
         path.write_text(text, encoding="utf-8")

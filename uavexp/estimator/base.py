@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
 
 from uavexp.types import State
 
+Believe = Callable[[State, float], State]  # the believed state of the true one after another step, s
+
 
 class Estimator(Protocol):
-    """Turns the true state into the believed one, once per simulation step."""
+    """The error's law; what it begins is asked once per simulation step of one trial."""
 
-    def reset(self, rng: np.random.Generator) -> None:
+    def begin(self, rng: np.random.Generator) -> Believe:
         """Begin a trial, drawing noise from `rng`."""
-
-    def estimate(self, true_state: State, step_s: float) -> State:
-        """Return the believed state after another `step_s`."""

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from uavexp.estimator.base import Believe
 from uavexp.parameters import option
-from uavexp.types import State
 
 
-@option
+@option(frozen=True)
 class Perfect:
     """Returns the true state."""
 
-    def reset(self, rng: np.random.Generator) -> None:
+    def begin(self, rng: np.random.Generator) -> Believe:
         """Begin a trial; nothing is drawn."""
-
-    def estimate(self, true_state: State, step_s: float) -> State:
-        """Return the true state."""
-        return true_state
+        return lambda true_state, step_s: true_state

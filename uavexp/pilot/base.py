@@ -13,7 +13,7 @@ from uavexp.explorer.base import Explorer
 from uavexp.log import Replan
 from uavexp.planner.base import Planner
 from uavexp.recorder import Stopwatch
-from uavexp.safety.base import Safety
+from uavexp.safety.base import MustBrake
 from uavexp.trajectory import Trajectory
 from uavexp.trigger.base import TriggerPolicy
 from uavexp.types import Goal, Limits, Observation, PlanResult, Reference
@@ -26,7 +26,7 @@ class Crew:
     explorer: Explorer
     trigger: TriggerPolicy
     planner: Planner
-    safety: Safety
+    must_brake: MustBrake
     limits: Limits
     latency_s: float  # from a request to its effect
     start_m: Float  # (3,)

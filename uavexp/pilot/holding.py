@@ -120,7 +120,7 @@ class HoldingPilot:
 
     def decide(self, observation: Observation) -> float:
         """Ask safety and trigger; return the trigger's score."""
-        if not self.failure and self.crew.safety.must_brake(observation):
+        if not self.failure and self.crew.must_brake(observation):
             self._brake(observation.time_s, "braked before an obstacle or unknown space")
             self._wait_for_rest = True
         with self.crew.watch.lap("trigger"):

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
 from uavexp.types import Limits, Observation
 
+MustBrake = Callable[[Observation], bool]  # whether to leave the trajectory and stop now
+
 
 class Safety(Protocol):
-    """Asked after every ESDF update; built fresh for every trial."""
+    """The rule; what it begins is asked after every ESDF update of one trial."""
 
-    def reset(self, limits: Limits) -> None:
+    def begin(self, limits: Limits) -> MustBrake:
         """Begin a trial."""
-
-    def must_brake(self, observation: Observation) -> bool:
-        """Whether to leave the trajectory and stop now."""

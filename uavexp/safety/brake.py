@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+import functools
 
 import numpy as np
 
 from uavexp.braking import stopping_distance_m
 from uavexp.errors import require
 from uavexp.parameters import NonNegative, option
+from uavexp.safety.base import MustBrake
 from uavexp.trajectory import evaluate, sample_times
 from uavexp.types import Limits, Observation
 
 _SAMPLE_S = 0.04  # at 2.5 m/s one voxel apart
 
 
-@option
+@option(frozen=True)
 class Brake:
     """Brakes when the path within the stopping distance ahead is not known to be free."""
 
@@ -23,21 +24,20 @@ class Brake:
     # radius + this [ours]
     reaction_s: NonNegative = 0.2  # s, flown on before braking begins: one ESDF period and the latency [ours]
     stop_at_unknown: bool = True  # also brake before leaving known-free space
-    _limits: Limits | None = field(init=False, repr=False, default=None)
 
-    def reset(self, limits: Limits) -> None:
+    def begin(self, limits: Limits) -> MustBrake:
         """Begin a trial."""
         require(limits.max_acceleration_mps2 > 0.0, "max_acceleration_mps2 must be > 0 to brake")
-        self._limits = limits
+        return functools.partial(self._must_brake, limits)
 
-    def must_brake(self, observation: Observation) -> bool:
+    def _must_brake(self, limits: Limits, observation: Observation) -> bool:
         """Whether the trajectory, up to the stopping distance ahead, is blocked or unknown.
 
         The look-ahead distance is the stopping distance, plus what is flown in `reaction_s` (one ESDF
         period and the latency), plus the body's radius.
         """
-        limits, trajectory = self._limits, observation.trajectory
-        if limits is None or trajectory is None:
+        trajectory = observation.trajectory
+        if trajectory is None:
             return False
         times_s = sample_times(trajectory, observation.time_s, _SAMPLE_S)
         points_m = evaluate(trajectory, times_s)[0]

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from uavexp.parameters import option
-from uavexp.types import Limits, Observation
+from uavexp.safety.base import MustBrake
+from uavexp.types import Limits
 
 
-@option
+@option(frozen=True)
 class NoBrake:
     """Never brakes; or nobody would ever collide and triggers could not be compared."""
 
-    def reset(self, limits: Limits) -> None:
+    def begin(self, limits: Limits) -> MustBrake:
         """Begin a trial."""
-
-    def must_brake(self, observation: Observation) -> bool:
-        """Return False."""
-        return False
+        return lambda observation: False

@@ -25,14 +25,14 @@ ORIGIN = State(
 
 def errors(estimator: Drift, seed: int, count: int, step_s: float) -> tuple[np.ndarray, np.ndarray]:
     """Position (T, 3) and yaw (T,) errors of an estimator that is told to stand still."""
-    estimator.reset(np.random.default_rng(seed))
-    states = [estimator.estimate(ORIGIN, step_s) for _ in range(count)]
+    believe = estimator.begin(np.random.default_rng(seed))
+    states = [believe(ORIGIN, step_s) for _ in range(count)]
     yaw = np.array([wrap_angle(yaw_of(s.quaternion_wxyz) - 0.4) for s in states])
     return np.array([s.position_m for s in states]), yaw
 
 
 def test_perfect_is_the_truth():
-    assert Perfect().estimate(ORIGIN, 0.01) is ORIGIN
+    assert Perfect().begin(np.random.default_rng(0))(ORIGIN, 0.01) is ORIGIN
 
 
 def test_drift_rates_keep_their_bounds():
@@ -65,15 +65,14 @@ def test_spread_is_that_of_the_gauss_markov_walk_whatever_the_step(step_s):
 
 
 def test_believed_body_rate_is_the_turning_of_the_believed_attitude():
-    estimator = Drift(yaw_drift_radps=0.1, max_yaw_drift_radps=0.5)
-    estimator.reset(np.random.default_rng(3))
+    believe = Drift(yaw_drift_radps=0.1, max_yaw_drift_radps=0.5).begin(np.random.default_rng(3))
     tilted = State(
         position_m=np.zeros(3),
         velocity_mps=np.zeros(3),
         quaternion_wxyz=np.array([math.cos(0.3), 0.0, math.sin(0.3), 0.0]),
         body_rate_radps=np.zeros(3),
     )
-    before, after = (estimator.estimate(tilted, 1e-3) for _ in range(2))
+    before, after = (believe(tilted, 1e-3) for _ in range(2))
     a, b = (rotation_from_quaternion(s.quaternion_wxyz) for s in (before, after))
     turn = a.T @ b
     rate = 0.5 / 1e-3 * np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
@@ -98,10 +97,10 @@ def test_refuses_a_bound_below_the_rms():
 @pytest.mark.parametrize("estimator", [Perfect(), Drift()], ids=["perfect", "drift"])
 def test_believed_velocity_is_the_rate_of_believed_position(estimator):
     step_s, velocity, believed = 0.01, np.array([0.5, 0.0, -0.5]), []
-    estimator.reset(np.random.default_rng(1))
+    believe = estimator.begin(np.random.default_rng(1))
     for k in range(100):
         truth = replace(ORIGIN, position_m=k * step_s * velocity, velocity_mps=velocity)
-        believed.append(estimator.estimate(truth, step_s))
+        believed.append(believe(truth, step_s))
     for before, after in pairwise(believed):
         rate = (after.position_m - before.position_m) / step_s
         np.testing.assert_allclose(rate, before.velocity_mps, atol=1e-9)

@@ -42,12 +42,11 @@ def make(
     planner.reset(LIMITS, np.random.default_rng(0))
     explorer.reset(1.0, LIMITS)
     trigger.reset(LIMITS)
-    safety.reset(LIMITS)
     crew = Crew(
         explorer=explorer,
         trigger=trigger,
         planner=planner,
-        safety=safety,
+        must_brake=safety.begin(LIMITS),
         limits=LIMITS,
         watch=Stopwatch(),
         latency_s=latency_s,

@@ -37,9 +37,9 @@ def walled(x_m: float, *, unknown: bool = False) -> DistanceField:
 
 def first_brake_m(brake: Brake, field: DistanceField) -> float:
     """Position along x at which the brake first asks to stop."""
-    brake.reset(LIMITS)
+    must_brake = brake.begin(LIMITS)
     times = np.arange(1.0, 6.0, 0.01)
-    asked = [t for t in times if brake.must_brake(flying(field, t))]
+    asked = [t for t in times if must_brake(flying(field, t))]
     return 0.5 + (asked[0] - 1.0) if asked else float("inf")
 
 
@@ -59,9 +59,7 @@ def test_brakes_before_unknown_space_only_when_asked() -> None:
 
 
 def test_no_brake_never_brakes() -> None:
-    safety = NoBrake()
-    safety.reset(LIMITS)
-    assert not safety.must_brake(flying(walled(1.0), 2.0))
+    assert not NoBrake().begin(LIMITS)(flying(walled(1.0), 2.0))
 
 
 def test_a_vehicle_that_cannot_decelerate_is_refused() -> None:
@@ -69,4 +67,4 @@ def test_a_vehicle_that_cannot_decelerate_is_refused() -> None:
         max_speed_mps=1.0, max_acceleration_mps2=0.0, max_body_rate_radps=1.0, body_size_m=(0.3, 0.3, 0.1)
     )
     with pytest.raises(ValueError, match="max_acceleration_mps2"):
-        Brake().reset(still)
+        Brake().begin(still)
