@@ -74,7 +74,7 @@ def row_of(record: Record, wall: Mapping[str, Any], labels: Mapping[str, str]) -
         "world_digest": world.get("digest"),
         "code": record["code"][:12],
         "lock": (record.get("lock") or "")[:12],
-        **_parameters(record["config"]),
+        **parameters(record["config"]),
         **_clock(wall),
     }
 
@@ -150,19 +150,26 @@ def write_table(path: Path, rows: Sequence[Row], first: Sequence[str] = FIRST) -
     write_atomically(path, lambda file: parquet.write_table(table, file, write_page_checksum=True))
 
 
-def _parameters(config: Mapping[str, Any]) -> Row:
+def parameters(config: Mapping[str, Any]) -> Row:
     """`p_<group>_<parameter>` of every group, `p_<key>` of what belongs to none."""
     row: Row = {}
     for name, value in config.items():
-        if isinstance(value, Mapping):
-            row |= {f"p_{name}_{key}": _parameter(item) for key, item in value.items() if key != _TARGET}
-        else:
-            row[f"p_{name}"] = _parameter(value)
+        parts = value if isinstance(value, Mapping) else {"": value}
+        for key, item in parts.items():
+            if key != _TARGET:
+                row |= _parameter(f"p_{name}_{key}".rstrip("_"), item)
     return row
 
 
-def _parameter(value: Any) -> Any:
-    return None if value is None else restore(value)
+def _parameter(column: str, value: Any) -> Row:
+    """A parameter's column; of an option that is held: its name, and columns of its parameters."""
+    if isinstance(value, Mapping) and _TARGET in value:
+        row: Row = {column: str(value[_TARGET]).split(".")[-2]}
+        for key, item in value.items():
+            if key != _TARGET:
+                row |= _parameter(f"{column}_{key}", item)
+        return row
+    return {column: None if value is None else restore(value)}
 
 
 def _clock(wall: Mapping[str, Any]) -> Row:

@@ -1,0 +1,17 @@
+"""Columns of parameters: an option that another one holds has its name and its own parameters."""
+
+from __future__ import annotations
+
+from uavexp.config.composition import Composer
+from uavexp.config.overrides import parse_settings
+from uavexp.store.table import parameters
+
+
+def test_an_option_that_is_held_has_its_name_and_columns_of_its_own() -> None:
+    typed = ["planner.find=turning", "planner.find.turn_weight=0.7"]
+    row = parameters(Composer().cell(parse_settings(typed)).config)
+    assert row["p_planner_find"] == "turning"
+    assert row["p_planner_find_turn_weight"] == 0.7
+    assert row["p_planner_min_clearance_m"] == 0.26
+    assert row["p_step_s"] == 0.01
+    assert not any("_target_" in column for column in row)
