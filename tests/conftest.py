@@ -1,6 +1,39 @@
-"""Property tests draw the same examples everywhere: a failure in one clone is one in all."""
+"""What all tests share: property tests that draw the same everywhere, and one small flown study."""
 
+from __future__ import annotations
+
+import shutil
+
+import pytest
 from hypothesis import settings
 
+from tests.folders import DATA
+from uavexp.__main__ import main
+from uavexp.store.study import STUDY, Study, read_study
+
+# a failure in one clone is one in all
 settings.register_profile("same_everywhere", derandomize=True)
 settings.load_profile("same_everywhere")
+
+STORED = DATA / "study"
+_SMALL = (
+    "experiments=mcr/table1",
+    "arm=SSP,TBR,MCR",
+    "scene=columns sparse,rooms",
+    "seed=0:2",
+    "vehicle=point_mass",
+    "world.size_m=[10,8,3]",
+    "stuck_s=8",
+)
+
+
+@pytest.fixture(scope="session")
+def flown(tmp_path_factory: pytest.TempPathFactory) -> Study:
+    """A study with logs and worlds: the one in `tests/data`, else twelve short flights."""
+    folder = tmp_path_factory.getbasetemp() / "small-study"
+    if not folder.exists():
+        if (STORED / STUDY).is_file():
+            shutil.copytree(STORED, folder)
+        else:
+            assert main([*_SMALL, f"out={folder}"]) == 0
+    return read_study(folder)

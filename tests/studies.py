@@ -1,4 +1,4 @@
-"""A small study of real flights, for tests of what reads study folders."""
+"""Studies for tests of what reads study folders: copies of flown ones, and made-up ones."""
 
 from __future__ import annotations
 
@@ -8,36 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-import pytest
 
-from tests.folders import DATA
-from uavexp.__main__ import main
 from uavexp.config.experiment import list_experiments, read_experiment
 from uavexp.store.study import STUDY, Study, read_study
 from uavexp.store.table import REPLANS, TABLE, write_table
-
-STORED = DATA / "study"
-_SMALL = (
-    "experiments=mcr/table1",
-    "arm=SSP,TBR,MCR",
-    "scene=columns sparse,rooms",
-    "seed=0:2",
-    "vehicle=point_mass",
-    "world.size_m=[10,8,3]",
-    "stuck_s=8",
-)
-
-
-@pytest.fixture(scope="session")
-def flown(tmp_path_factory: pytest.TempPathFactory) -> Study:
-    """A study with logs and worlds: the one in `tests/data`, else twelve short flights."""
-    folder = tmp_path_factory.getbasetemp() / "small-study"
-    if not folder.exists():
-        if (STORED / STUDY).is_file():
-            shutil.copytree(STORED, folder)
-        else:
-            assert main([*_SMALL, f"out={folder}"]) == 0
-    return read_study(folder)
 
 
 def copy_of(study: Study, folder: Path, **changes: Any) -> Study:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.folders import ROOT
-from tests.studies import copy_of, flown, shipped  # noqa: F401
+from tests.studies import copy_of, shipped
 
 FOLDER = ROOT / "analysis"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
@@ -34,7 +34,7 @@ def test_each_is_of_an_experiment():
 
 
 @pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
-def test_it_runs_and_shows_tables_and_figures(file, flown, tmp_path, monkeypatch):  # noqa: F811
+def test_it_runs_and_shows_tables_and_figures(file, flown, tmp_path, monkeypatch):
     from IPython.display import Image, Markdown
 
     report = shipped(EXPERIMENTS[file.stem])

@@ -9,18 +9,13 @@ import shutil
 import subprocess
 import sys
 import tomllib
-import types
 from pathlib import Path
 
-import numpy as np
 import pytest
 import yaml
 from packaging.requirements import Requirement
 
 from tests.folders import ROOT
-from uavexp.check.fields import field_from
-from uavexp.trajectory import evaluate
-from uavexp.types import Goal, Limits, PlanRequest, PlanStatus
 
 LOCK = (ROOT / "requirements.lock").read_text()
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -141,75 +136,3 @@ class TestDescriptions:
     def test_one_licence_everywhere(self):
         assert (ROOT / "LICENSE").read_text().startswith("MIT License\n")
         assert yaml.safe_load((ROOT / "CITATION.cff").read_text())["license"] == PROJECT["license"] == "MIT"
-
-
-@pytest.fixture(scope="module")
-def guide():
-    text = (ROOT / "CONTRIBUTING.md").read_text()
-    blocks = {
-        language: re.search(rf"```{language}\n(.*?)```", text, re.DOTALL) for language in ("python", "yaml")
-    }
-    module = types.ModuleType("uavexp.planner.straight")
-    sys.modules[module.__name__] = module
-    try:
-        exec(blocks["python"].group(1), module.__dict__)
-        yield module, yaml.safe_load(blocks["yaml"].group(1))
-    finally:
-        del sys.modules[module.__name__]
-
-
-class TestContributingGuide:
-    """The planner that the guide shows really is one."""
-
-    START_M, GOAL_M = np.array([1.0, 2.0, 1.0]), np.array([6.0, 2.0, 1.0])
-
-    def plan(self, module, occupied):
-        planner = module.Straight()
-        limits = Limits(
-            max_speed_mps=2.5,
-            max_acceleration_mps2=2.5,
-            max_body_rate_radps=2.0,
-            body_size_m=(0.32, 0.32, 0.12),
-        )
-        planner.reset(limits, np.random.default_rng(0))
-        request = PlanRequest(
-            time_s=3.0,
-            position_m=self.START_M,
-            velocity_mps=np.array([0.5, 0.2, 0.0]),
-            acceleration_mps2=np.array([0.1, -0.3, 0.2]),
-            goal=Goal(position_m=self.GOAL_M, is_target=True, score=0.0),
-            field=field_from(occupied),
-            flight_bounds_m=np.array([[0.0, 0.0, 0.0], [8.0, 4.0, 2.0]]),
-        )
-        return request, limits, planner.plan(request)
-
-    def test_it_keeps_the_contract(self, guide):
-        occupied = np.zeros((80, 40, 20), dtype=bool)
-        occupied[:, :2] = True
-        request, limits, result = self.plan(guide[0], occupied)
-        assert result.status is PlanStatus.OK
-        first, *_, last = zip(
-            *evaluate(result.trajectory, np.linspace(3.0, result.trajectory.end_s, 500)), strict=True
-        )
-        for value, wanted in zip(
-            first, (request.position_m, request.velocity_mps, request.acceleration_mps2), strict=True
-        ):
-            np.testing.assert_allclose(value, wanted, atol=1e-9)
-        for value, wanted in zip(last, (self.GOAL_M, np.zeros(3), np.zeros(3)), strict=True):
-            np.testing.assert_allclose(value, wanted, atol=1e-6)
-        _, velocity, acceleration = evaluate(
-            result.trajectory, np.linspace(3.0, result.trajectory.end_s, 500)
-        )
-        assert np.linalg.norm(velocity, axis=1).max() <= limits.max_speed_mps + 1e-3
-        assert np.linalg.norm(acceleration, axis=1).max() <= limits.max_acceleration_mps2 + 1e-2
-
-    def test_it_refuses_to_fly_through_a_wall(self, guide):
-        occupied = np.zeros((80, 40, 20), dtype=bool)
-        occupied[40:42] = True
-        assert self.plan(guide[0], occupied)[2].status is PlanStatus.NOT_CLEAR
-
-    def test_its_yaml_names_every_parameter_with_its_default(self, guide):
-        module, config = guide
-        assert config.pop("_target_") == "uavexp.planner.straight.Straight"
-        planner = module.Straight()
-        assert config == {name: getattr(planner, name) for name in ("clearance_m", "longest_s")}

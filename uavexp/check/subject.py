@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from uavexp.check.promise import Make, breach, promises
-from uavexp.config.build import GROUPS, build_component
+from uavexp.config.build import GROUPS, TARGET, build_component
 from uavexp.config.composition import Composer
 from uavexp.config.options import read_option
 from uavexp.config.overrides import Setting
@@ -60,6 +60,8 @@ def subjects(composer: Composer, settings: Sequence[Setting]) -> list[Subject]:
 def _subject(composer: Composer, group: str, option: str, values: Sequence[Setting]) -> Subject:
     own = [item for item in values if item.key.startswith(f"{group}.")]
     tree = composer.compose([Setting(key=group, values=(option,)), *own])[group]
+    if TARGET not in tree:
+        raise ConfigError(f"{group}={option}: the option has no {TARGET}")
     build_component(group, tree)  # what it refuses is told before anything is checked
     return Subject(group=group, option=option, make=functools.partial(build_component, group, tree))
 

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from matplotlib.text import Text
 
-from tests.studies import copy_of, flown, made_up, shipped  # noqa: F401
+from tests.studies import copy_of, made_up, shipped
 from uavexp.causes import cause_named
 from uavexp.metrics import replanning
 from uavexp.metrics.replanning import COUNTED, cause_metric
@@ -30,7 +30,7 @@ TEXT_PT = 7.0  # the least that is read in print
 
 
 @pytest.fixture(scope="module")
-def drawings(flown):  # noqa: F811
+def drawings(flown):
     return {drawing.name: drawing for drawing in Report(study=flown).drawings()}
 
 
@@ -46,14 +46,14 @@ class TestWhatIsDrawn:
     def test_a_study_with_logs_gets_the_papers_figures(self, drawings):
         assert {*WITH_LOGS, "figure_6", "figure_7", "figure_9", "success"} <= set(drawings)
 
-    def test_without_logs_the_figures_of_single_flights_are_left_out(self, flown, tmp_path):  # noqa: F811
+    def test_without_logs_the_figures_of_single_flights_are_left_out(self, flown, tmp_path):
         study = copy_of(flown, tmp_path / "bare")
         shutil.rmtree(study.folder / TRIALS)
         names = {drawing.name for drawing in Report(study=study).drawings()}
         assert names >= {"figure_6", "figure_7", "figure_9", "success"}
         assert not names & {*WITH_LOGS, "figure_10"}
 
-    def test_without_worlds_too(self, flown, tmp_path):  # noqa: F811
+    def test_without_worlds_too(self, flown, tmp_path):
         study = copy_of(flown, tmp_path / "bare")
         shutil.rmtree(study.folder / WORLDS)
         assert not {drawing.name for drawing in Report(study=study).drawings()} & {*WITH_LOGS, "figure_10"}
@@ -63,7 +63,7 @@ class TestWhatIsDrawn:
             assert "seed" in drawing.caption, drawing.name
             assert "n = " in drawing.caption or "trials" in drawing.caption, drawing.name
 
-    def test_the_same_study_gives_the_same_bytes_and_leaves_the_users_style_alone(self, flown):  # noqa: F811
+    def test_the_same_study_gives_the_same_bytes_and_leaves_the_users_style_alone(self, flown):
         with mpl.rc_context({"font.size": 23.0}):
             again = {drawing.name: drawing for drawing in Report(study=flown).drawings()}
             assert mpl.rcParams["font.size"] == 23.0
@@ -80,7 +80,7 @@ class TestWhatIsDrawn:
 
 
 class TestWhichFlights:
-    def test_the_world_shown_is_the_lowest_seed_flown_by_every_arm(self, flown, tmp_path):  # noqa: F811
+    def test_the_world_shown_is_the_lowest_seed_flown_by_every_arm(self, flown, tmp_path):
         study = copy_of(flown, tmp_path / "holes")
         flights, arms = Results(study=study).trials, shown_flights.three_arms(Results(study=study))
 
@@ -102,7 +102,7 @@ class TestWhichFlights:
         study = made_up(tmp_path, rows, axes, settings={"primary": "MCR"})
         assert shown_flights.three_arms(Results(study=study)) == ("SSP", "TBR", "MCR")
 
-    def test_replans_of_the_table_are_those_of_the_logs(self, flown):  # noqa: F811
+    def test_replans_of_the_table_are_those_of_the_logs(self, flown):
         flights = Results(study=flown).trials
         counted = shown_flights.executed(flown.replans, flights)["trial"].value_counts()
         for row in flights.to_dict("records"):
@@ -111,7 +111,7 @@ class TestWhichFlights:
 
 
 class TestPaths:
-    def test_figure_3_draws_the_flown_paths_to_scale(self, flown, drawings):  # noqa: F811
+    def test_figure_3_draws_the_flown_paths_to_scale(self, flown, drawings):
         results = Results(study=flown)
         arms = shown_flights.three_arms(results)
         shared = next(shown_flights.shared_worlds(results, arms, results.scenes[:1]))
@@ -122,7 +122,7 @@ class TestPaths:
             assert any(np.linalg.norm(line[-1] - log.steps.position_m[-1, :2]) < 0.1 for line in ends)
         assert axes.get_aspect() == 1.0
 
-    def test_figure_9_has_a_marker_for_every_replan_of_the_scene(self, flown, drawings):  # noqa: F811
+    def test_figure_9_has_a_marker_for_every_replan_of_the_scene(self, flown, drawings):
         flights, scene = Results(study=flown).trials, Results(study=flown).scenes[0]
         expected = shown_flights.executed(flown.replans, flights[flights["scene"] == scene])
         causes = {cause_named(cause).colour for cause in expected["cause"]}

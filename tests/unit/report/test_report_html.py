@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.studies import copy_of, flown, made_up  # noqa: F401
+from tests.studies import copy_of, made_up
 from uavexp.metrics import replanning
 from uavexp.report import flight3d, html
 from uavexp.report.contents import Judgement, Report
@@ -72,7 +72,7 @@ def written(study, drawings=()) -> str:
 
 
 @pytest.fixture(scope="module")
-def drawn(flown, tmp_path_factory):  # noqa: F811
+def drawn(flown, tmp_path_factory):
     folder = tmp_path_factory.mktemp("figures")
     pairs = []
     for drawing in Report(study=flown).drawings():
@@ -83,7 +83,7 @@ def drawn(flown, tmp_path_factory):  # noqa: F811
 
 
 @pytest.fixture(scope="module")
-def page(flown, drawn):  # noqa: F811
+def page(flown, drawn):
     return Page(written(flown, drawn))
 
 
@@ -101,7 +101,7 @@ class TestOneFile:
             assert base64.b64decode(source.removeprefix("data:image/png;base64,")) == path.read_bytes()
             assert drawing.caption in page.words
 
-    def test_the_same_study_gives_the_same_bytes(self, flown, drawn):  # noqa: F811
+    def test_the_same_study_gives_the_same_bytes(self, flown, drawn):
         assert written(flown, drawn) == written(flown, drawn)
 
     def test_links_within_the_page_lead_somewhere(self, page):
@@ -113,7 +113,7 @@ class TestOneFile:
         ids = [attributes["id"] for _, attributes in page.tags if attributes.get("id")]
         assert len(ids) == len(set(ids))
 
-    def test_what_looks_like_markup_is_shown_not_obeyed(self, flown, tmp_path):  # noqa: F811
+    def test_what_looks_like_markup_is_shown_not_obeyed(self, flown, tmp_path):
         study = copy_of(flown, tmp_path / "hostile", title="</title><script>alert(1)</script>")
         text = written(study)
         assert "alert(1)</script>" not in text
@@ -126,7 +126,7 @@ class TestOneFile:
         for mark in ("✓ reproduced", "✗ not reproduced", "– not testable"):
             assert mark in page.words
 
-    def test_the_command_is_told_without_where_it_wrote_to(self, flown, tmp_path):  # noqa: F811
+    def test_the_command_is_told_without_where_it_wrote_to(self, flown, tmp_path):
         study = copy_of(flown, tmp_path / "run")
         runs = {
             "runs": [{"command": ["experiments=mcr/table1", "out=/home/me", "runner.n_jobs=3", "arm=A B"]}]
@@ -141,7 +141,7 @@ class TestFailedTrials:
     def rows(self, page):
         return [link["href"] for link in page.all("a") if link["href"].startswith(TRIALS)]
 
-    def test_each_leads_to_its_picture_and_tells_the_command_that_repeats_it(self, flown, tmp_path):  # noqa: F811
+    def test_each_leads_to_its_picture_and_tells_the_command_that_repeats_it(self, flown, tmp_path):
         study = copy_of(flown, tmp_path / "linked")
         failed = study.trials[~study.trials["success"]]["trial"]
         assert len(failed)
@@ -154,7 +154,7 @@ class TestFailedTrials:
             command = read_wall(study.folder / TRIALS / trial).get("command")
             assert command is None or command in page.words
 
-    def test_without_a_stored_picture_there_is_no_link_but_the_command_that_makes_it(self, flown, tmp_path):  # noqa: F811
+    def test_without_a_stored_picture_there_is_no_link_but_the_command_that_makes_it(self, flown, tmp_path):
         study = copy_of(flown, tmp_path / "packed")
         for picture in (study.folder / TRIALS).glob("*/picture.png"):
             picture.unlink()
@@ -166,7 +166,7 @@ class TestFailedTrials:
         for command in failed["wall_command"]:
             assert command in page.words
 
-    def test_trials_that_succeeded_are_not_listed(self, flown, page):  # noqa: F811
+    def test_trials_that_succeeded_are_not_listed(self, flown, page):
         won = set(flown.trials[flown.trials["success"]]["trial"])
         assert not won & {href.split("/")[1] for href in self.rows(page)}
 
@@ -197,7 +197,7 @@ class TestFlight:
         script = gzip.decompress(base64.b64decode(page.texts["plotly-gz"]))
         assert script == flight3d.plotly_file().read_bytes()
 
-    def test_paths_and_replans_are_those_of_the_logs(self, flown, page):  # noqa: F811
+    def test_paths_and_replans_are_those_of_the_logs(self, flown, page):
         flights = self.payload(page)["flights"]
         assert [flight["arm"] for flight in flights] == ["SSP", "TBR", "MCR"]
         first = flown.trials.sort_values("seed", kind="stable")
@@ -211,7 +211,7 @@ class TestFlight:
             assert causes == [replan.cause for replan in replanning.executed(log)]
             assert len(flight["contacts"][0]) == len(log.contacts)
 
-    def test_the_map_comes_back_voxel_by_voxel(self, flown, page):  # noqa: F811
+    def test_the_map_comes_back_voxel_by_voxel(self, flown, page):
         flight = self.payload(page)["flights"][-1]
         row = flown.trials[(flown.trials["arm"] == "MCR") & (flown.trials["scene"] == flown.axes["scene"][0])]
         expected = flown.log(row.sort_values("seed")["trial"].iloc[0]).mapped_m
@@ -219,14 +219,14 @@ class TestFlight:
             sorted(centres(flight["map"]).tolist()), sorted(expected.tolist()), atol=2e-3
         )
 
-    def test_without_logs_there_is_no_view(self, flown, tmp_path):  # noqa: F811
+    def test_without_logs_there_is_no_view(self, flown, tmp_path):
         study = copy_of(flown, tmp_path / "bare")
         shutil.rmtree(study.folder / TRIALS)
         page = Page(written(study))
         assert "plotly-gz" not in page.texts
         assert "a-flight-in-3d" not in {attributes.get("id") for _, attributes in page.tags}
 
-    def test_without_plotly_the_page_says_how_to_get_it(self, flown, tmp_path, monkeypatch):  # noqa: F811
+    def test_without_plotly_the_page_says_how_to_get_it(self, flown, tmp_path, monkeypatch):
         monkeypatch.setattr(flight3d, "plotly_file", lambda: None)
         page = Page(written(copy_of(flown, tmp_path / "without")))
         assert "pip install plotly" in page.words

@@ -14,7 +14,7 @@ import pyarrow as pa
 import pytest
 from pyarrow import parquet
 
-from tests.studies import copy_of, flown, shipped  # noqa: F401
+from tests.studies import copy_of, shipped
 from tests.unit.report.test_report_tables import BAD, GOOD, WORST, trials_of
 from uavexp.errors import RecordError
 from uavexp.report import make
@@ -142,7 +142,7 @@ def test_files_of_an_earlier_report_go_and_no_others(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("deed", ["cut", "gone"])
 def test_a_damaged_world_costs_its_figures_alone_and_is_told(
-    flown: Study,  # noqa: F811
+    flown: Study,
     deed: str,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
