@@ -16,7 +16,7 @@ LAYERS = (
     {"arrays", "errors", "kernel_cache"},
     {"field", "trajectory", "seeding", "paths", "geometry", "o3d"},
     {"types", "log", "causes", "parameters"},
-    {"braking", "flatness", "triangle_grid", "bodies", "scene"},
+    {"braking", "triangle_grid", "bodies", "scene"},
     {"cloud"},
     {"roles", "metrics", "inspection"},
     {"recorder", "pilot", "trial"},
@@ -40,25 +40,18 @@ def name_of(file: Path) -> str:
     return ".".join(parts[:-1] if parts[-1] == "__init__" and len(parts) > 2 else parts)
 
 
-def imports(file: Path) -> Iterator[tuple[str, bool]]:
-    """Imported module names, and whether only for type checking."""
-    tree = ast.parse(file.read_text(encoding="utf-8"))
-    typing_only = {
-        id(inner)
-        for node in ast.walk(tree)
-        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
-        for inner in ast.walk(node)
-    }
-    for node in ast.walk(tree):
+def imports(file: Path) -> Iterator[str]:
+    """Imported module names; what is imported for type checking alone counts like the rest."""
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
-            yield from ((alias.name, id(node) in typing_only) for alias in node.names)
+            yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{file}: relative import"
             folder = PACKAGE.parent / str(node.module).replace(".", "/")
             inner = [alias.name for alias in node.names if (folder / f"{alias.name}.py").is_file()]
-            yield from ((f"{node.module}.{name}", id(node) in typing_only) for name in inner)
+            yield from (f"{node.module}.{name}" for name in inner)
             if len(inner) < len(node.names):
-                yield str(node.module), id(node) in typing_only
+                yield str(node.module)
 
 
 def part_of(module: str) -> str:
@@ -78,8 +71,8 @@ def test_a_module_imports_only_what_lies_below(file: Path) -> None:
     here = name_of(file)
     if part_of(here) == "__init__":
         return  # its one import of `fly` happens when it is called
-    for module, typing_only in imports(file):
-        if module.split(".")[0] != "uavexp" or typing_only or module == "uavexp":
+    for module in imports(file):
+        if module.split(".")[0] != "uavexp" or module == "uavexp":
             continue
         above = layer_of(module) > layer_of(here)
         assert not above, f"{here} imports {module}, which lies above it"
@@ -95,7 +88,7 @@ def test_a_role_imports_another_role_through_its_base_or_pure_modules(file: Path
         for group in GROUPS
         for item in (PACKAGE.parent / "conf" / group).glob("*.yaml")
     }
-    for module, _ in imports(file):
+    for module in imports(file):
         foreign = (
             module.startswith("uavexp.")
             and module.split(".")[1] in GROUPS
@@ -106,23 +99,19 @@ def test_a_role_imports_another_role_through_its_base_or_pure_modules(file: Path
 
 @pytest.mark.parametrize("file", modules(), ids=name_of)
 def test_hydra_stays_on_the_command_line(file: Path) -> None:
-    users = [module for module, _ in imports(file) if module.split(".")[0] in HYDRA]
+    users = [module for module in imports(file) if module.split(".")[0] in HYDRA]
     assert not users or part_of(name_of(file)) in ("config", "cli"), f"{file} imports {users}"
 
 
 @pytest.mark.parametrize("file", modules(), ids=name_of)
 def test_open3d_comes_through_its_loader(file: Path) -> None:
-    users = [module for module, _ in imports(file) if module.split(".")[0] == "open3d"]
+    users = [module for module in imports(file) if module.split(".")[0] == "open3d"]
     assert not users or file.name == "o3d.py"
 
 
 def test_there_is_no_cycle() -> None:
     graph = {
-        name_of(file): {
-            module
-            for module, typing_only in imports(file)
-            if module.startswith("uavexp.") and not typing_only
-        }
+        name_of(file): {module for module in imports(file) if module.startswith("uavexp.")}
         for file in modules()
         if name_of(file) != "uavexp.__init__"
     }

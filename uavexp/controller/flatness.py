@@ -2,7 +2,7 @@
 
 Feedback, thrust and attitude are those of `position_velocity`. To the attitude loop it also gives the
 rate at which the wanted attitude turns, which differential flatness takes from acceleration and jerk of
-the reference (`uavexp.flatness`), so the attitude need not lag behind for the rate to come:
+the reference (`uavexp.vehicle.quadrotor_flatness`), so the attitude need not lag behind for the rate to come:
 
     W_ff = W(a_ref + g e3 + (c / m) |v| v, its derivative, yaw, yaw rate)
 
@@ -18,10 +18,10 @@ import numba as nb
 
 from uavexp.arrays import Float
 from uavexp.controller.position_velocity import PositionVelocity
-from uavexp.flatness import attitude_and_rate
 from uavexp.geometry import GRAVITY_MPS2, rotation_from_quaternion
 from uavexp.parameters import NonNegative, option
 from uavexp.types import Command, Reference, State
+from uavexp.vehicle.quadrotor_flatness import attitude_and_rate
 
 
 @nb.njit(cache=True)

@@ -12,12 +12,19 @@ from uavexp.arrays import Float
 from uavexp.controller.base import Controller
 from uavexp.controller.flatness import Flatness
 from uavexp.controller.position_velocity import PositionVelocity
-from uavexp.flatness import FlatOutputs, Motion, attitude_and_rate, demand, motion, rotor_speeds
 from uavexp.geometry import GRAVITY_MPS2
 from uavexp.trajectory import Trajectory, evaluate
 from uavexp.trajectory import derivative as trajectory_derivative
 from uavexp.types import Reference, State
 from uavexp.vehicle.quadrotor import Quadrotor, derivative, integrate
+from uavexp.vehicle.quadrotor_flatness import (
+    FlatOutputs,
+    Motion,
+    attitude_and_rate,
+    demand,
+    motion,
+    rotor_speeds,
+)
 
 PLANT = Quadrotor().plant
 DRAGGED = Quadrotor(drag_coefficient=40.0, rotor_inertia_kgm2=1e-4).plant  # so that every term counts

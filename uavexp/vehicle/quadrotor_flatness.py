@@ -19,7 +19,7 @@ is no part of the map: the speeds are those the rotors must have, not those to b
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numba as nb
 import numpy as np
@@ -27,9 +27,7 @@ import numpy as np
 from uavexp.arrays import Float
 from uavexp.geometry import GRAVITY_MPS2, quaternion_from_rotation
 from uavexp.trajectory import Trajectory, derivative
-
-if TYPE_CHECKING:
-    from uavexp.vehicle.quadrotor import Plant
+from uavexp.vehicle.quadrotor import Plant
 
 # rotor 1 front right, 2 front left, 3 rear left, 4 rear right
 _SIDE_X = np.array([1.0, 1.0, -1.0, -1.0])
