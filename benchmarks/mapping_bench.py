@@ -20,10 +20,11 @@ from uavexp.mapping.base import MapBackend
 from uavexp.mapping.dense import Dense
 from uavexp.mapping.projection import project
 from uavexp.mapping.voxel_block_grid import VoxelBlockGrid
+from uavexp.scan import DepthScan
 from uavexp.scene import Scene
 from uavexp.seeding import Stream, generator
 from uavexp.sensor.rgbd import Rgbd
-from uavexp.types import DepthScan, State, World
+from uavexp.types import State, World
 from uavexp.world.warehouse import Warehouse
 
 SPEED_MPS = 1.2

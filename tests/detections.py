@@ -10,7 +10,8 @@ import numpy as np
 from uavexp.arrays import Float
 from uavexp.check.fields import box, empty, field_from
 from uavexp.field import DistanceField
-from uavexp.types import Bodies, RayScan, Shape
+from uavexp.scan import RayScan
+from uavexp.types import Bodies, Shape
 
 SIZE_M = (8.0, 6.0, 3.0)
 WALLS = (

@@ -26,8 +26,8 @@ from uavexp.log import (
     TrackRows,
     TrialLog,
 )
+from uavexp.path_clearance import clearance_ahead_m
 from uavexp.scene import Scene
-from uavexp.trigger.validity import clearance_ahead_m
 from uavexp.types import (
     Bodies,
     Limits,

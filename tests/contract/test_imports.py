@@ -15,7 +15,7 @@ from uavexp.paths import PACKAGE
 LAYERS = (
     {"arrays", "errors", "kernel_cache"},
     {"field", "trajectory", "seeding", "paths", "geometry", "o3d"},
-    {"types", "log", "causes", "parameters"},
+    {"types", "scan", "log", "causes", "parameters", "map_change", "path_clearance"},
     {"braking", "triangle_grid", "bodies", "scene"},
     {"cloud"},
     {"roles", "metrics", "inspection"},

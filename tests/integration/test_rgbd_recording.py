@@ -8,13 +8,13 @@ import matplotlib.image
 import numpy as np
 import pytest
 from scipy.ndimage import distance_transform_edt
-
 from tests.contract.test_mapping_contract import NOTHING, OPTIONS, build
+
 from tests.folders import SHARED as DATA
 from uavexp.arrays import Float
 from uavexp.field import FREE, OCCUPIED, UNKNOWN
 from uavexp.mapping.base import MapBackend
-from uavexp.types import DepthScan
+from uavexp.scan import DepthScan
 
 FOLDER = DATA / "rgbd" / "sevenscenes_a"
 STEP = 4  # every 4th pixel of 640 x 480

@@ -13,7 +13,8 @@ from uavexp.check.hall import LIMITS
 from uavexp.check.promise import Make, keep, same, untouched
 from uavexp.check.scans import Box, ring_directions, take_ray_scan
 from uavexp.field import DistanceField
-from uavexp.types import Bodies, RayScan, Shape, Tracks
+from uavexp.scan import RayScan
+from uavexp.types import Bodies, Shape, Tracks
 
 _ROOM: list[Box] = [
     ((-0.2, -0.2, -0.2), (0.2, 6.2, 3.2)),

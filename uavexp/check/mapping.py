@@ -14,7 +14,8 @@ from uavexp.check.promise import Make, keep, same, untouched
 from uavexp.check.scans import Box, take_scan
 from uavexp.errors import WorldError
 from uavexp.field import OCCUPIED, UNKNOWN
-from uavexp.types import DepthScan, MapUpdate
+from uavexp.scan import DepthScan
+from uavexp.types import MapUpdate
 
 _BOUNDS_M = np.array([[0.0, 0.0, 0.0], [8.0, 6.0, 3.0]])
 _START_M = np.array([0.55, 3.05, 1.45])

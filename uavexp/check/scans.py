@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from uavexp.arrays import Float
-from uavexp.types import DepthScan, RayScan
+from uavexp.scan import DepthScan, RayScan
 
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]  # lower and upper corner, m
 

@@ -10,9 +10,10 @@ from uavexp.arrays import Float, Float32
 from uavexp.check.building import building, scene, scene_of
 from uavexp.check.hall import hovering
 from uavexp.check.promise import Make, keep, same, untouched
+from uavexp.scan import RayScan, Scan
 from uavexp.scene import Scene
 from uavexp.seeding import Stream, generator
-from uavexp.types import Bodies, RayScan, Scan, Shape, State
+from uavexp.types import Bodies, Shape, State
 
 _TIME_S = 1.5
 _SURFACE_M = 0.1  # from a surface, of all but one in a hundred of the measured points

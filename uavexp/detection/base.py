@@ -7,7 +7,8 @@ from typing import Protocol
 import numpy as np
 
 from uavexp.field import DistanceField
-from uavexp.types import Bodies, Limits, Scan, Tracks
+from uavexp.scan import Scan
+from uavexp.types import Bodies, Limits, Tracks
 
 
 class Detection(Protocol):

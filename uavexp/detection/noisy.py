@@ -16,7 +16,8 @@ from uavexp.detection.kalman import FilterParameters, Motion, MotionFilter
 from uavexp.detection.returns import without_bodies
 from uavexp.field import DistanceField
 from uavexp.parameters import NonNegative, option
-from uavexp.types import Bodies, Limits, Scan, Tracks
+from uavexp.scan import Scan
+from uavexp.types import Bodies, Limits, Tracks
 
 
 @option

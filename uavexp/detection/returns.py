@@ -10,7 +10,8 @@ import numpy as np
 
 from uavexp.arrays import Bool, Float, Float32, Int, UInt8
 from uavexp.bodies import distance_m
-from uavexp.types import Bodies, DepthScan, Scan
+from uavexp.scan import DepthScan, Scan
+from uavexp.types import Bodies
 
 
 class Returns(NamedTuple):

@@ -30,7 +30,8 @@ from uavexp.detection.returns import free_at, returns, viewpoint_m, without
 from uavexp.detection.tracker import Tracker, TrackRule
 from uavexp.field import DistanceField
 from uavexp.parameters import Count, NonNegative, Positive, option
-from uavexp.types import Bodies, Limits, Scan, Tracks
+from uavexp.scan import Scan
+from uavexp.types import Bodies, Limits, Tracks
 
 
 @option

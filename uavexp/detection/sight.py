@@ -6,7 +6,7 @@ import numba as nb
 import numpy as np
 
 from uavexp.arrays import Bool, Float, Float32
-from uavexp.types import DepthScan, Scan
+from uavexp.scan import DepthScan, Scan
 
 _LEAST_RAYS = 3  # through a box that is to count as empty
 _CORE = 0.5  # share of a box's size that rays must pass: its edges may be beside the body

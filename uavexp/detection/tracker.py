@@ -28,7 +28,8 @@ from uavexp.detection.kalman import Estimate, Motion, MotionFilter
 from uavexp.detection.returns import viewpoint_m
 from uavexp.detection.sight import seen_empty
 from uavexp.field import DistanceField
-from uavexp.types import Scan, Tracks
+from uavexp.scan import Scan
+from uavexp.types import Tracks
 
 _NEW_MISSES = 2  # a new track that misses more in a row is forgotten
 _EMPTY = 2  # a confirmed one that is seen to be gone more often in a row, too

@@ -8,7 +8,8 @@ from uavexp.bodies import present
 from uavexp.detection.returns import without_bodies
 from uavexp.field import DistanceField
 from uavexp.parameters import NonNegative, option
-from uavexp.types import Bodies, Limits, Scan, Tracks
+from uavexp.scan import Scan
+from uavexp.types import Bodies, Limits, Tracks
 
 
 @option

@@ -6,8 +6,9 @@ from typing import Protocol
 
 from uavexp.arrays import Float
 from uavexp.field import DistanceField
+from uavexp.scan import Scan
 from uavexp.scene import Scene
-from uavexp.types import MapUpdate, Scan
+from uavexp.types import MapUpdate
 
 
 class MapBackend(Protocol):

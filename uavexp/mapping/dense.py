@@ -21,8 +21,9 @@ from uavexp.mapping.occupancy import OccupancyMap, Rule, Voxels, observe, recipr
 from uavexp.mapping.parameters import MapParameters
 from uavexp.mapping.rays import integrate_rays
 from uavexp.parameters import option
+from uavexp.scan import RayScan, Scan
 from uavexp.scene import Scene
-from uavexp.types import MapUpdate, RayScan, Scan
+from uavexp.types import MapUpdate
 
 _NEAR_M = 1e-3  # nothing is nearer to the camera than this
 

@@ -25,8 +25,9 @@ from uavexp.mapping.esdf import SignedDistance
 from uavexp.mapping.occupancy import grid_shape
 from uavexp.mapping.parameters import FieldParameters
 from uavexp.parameters import NonNegative, option
+from uavexp.scan import Scan
 from uavexp.scene import Scene
-from uavexp.types import MapUpdate, Scan
+from uavexp.types import MapUpdate
 
 _BYTES_PER_VOXEL = 80  # ESDF 19, centres, rays and distances while it is made
 _BLOCKS = (8, 4, 2)  # edges of the blocks of voxels asked first, each half the one before

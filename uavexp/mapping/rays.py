@@ -21,7 +21,7 @@ import numpy as np
 
 from uavexp.arrays import Float, Float32, Int32
 from uavexp.mapping.occupancy import OccupancyMap, Rule, Voxels, observe, reciprocals
-from uavexp.types import RayScan
+from uavexp.scan import RayScan
 
 _INSIDE = 1e-6  # voxels before the grid's border: rounding must not lead out of it
 _LEVEL = 1e-12  # a ray that rises less along an axis never crosses a border of it

@@ -37,8 +37,9 @@ from uavexp.mapping.parameters import MapParameters
 from uavexp.mapping.rays import integrate_rays
 from uavexp.o3d import open3d
 from uavexp.parameters import Constraint, option
+from uavexp.scan import DepthScan, RayScan, Scan
 from uavexp.scene import Scene
-from uavexp.types import DepthScan, MapUpdate, RayScan, Scan
+from uavexp.types import MapUpdate
 
 _LARGEST_START = 20_000  # blocks that are allocated at once; more are added when needed
 _DEVICE = re.compile(r"CPU:0|CUDA:\d+")

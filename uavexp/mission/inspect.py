@@ -30,7 +30,7 @@ from uavexp.mission.coverage import Coverage, reachable_m, visible_anywhere
 from uavexp.mission.tour_guide import Look, TourGuide
 from uavexp.parameters import Count, NonNegative, Positive, Range, Share, between, option
 from uavexp.scene import Scene
-from uavexp.types import Limits, Observation, Outcome, State, Surface, World
+from uavexp.types import Limits, Observation, Outcome, ReferenceMap, State, World
 
 LOOK_S = 0.2  # between the instants at which the camera earns coverage
 
@@ -115,7 +115,7 @@ class Inspect:
 
     def prepare(self, world: World, rng: np.random.Generator) -> World:
         """The world with blocks and without what is gone; its reference as it is known."""
-        known = world.reference or Surface(
+        known = world.reference or ReferenceMap(
             vertices_m=world.vertices_m,
             triangles=world.triangles,
             inspected=np.ones(len(world.triangles), dtype=np.bool_),
@@ -123,7 +123,7 @@ class Inspect:
         mesh, kept = unforeseen.dropped(
             (known.vertices_m, known.triangles), world.bounds_m, self.unknown_share, rng
         )
-        known = Surface(vertices_m=mesh[0], triangles=mesh[1], inspected=known.inspected[kept])
+        known = ReferenceMap(vertices_m=mesh[0], triangles=mesh[1], inspected=known.inspected[kept])
         known = unforeseen.moved(known, self.shift_m, math.radians(self.turn_deg), rng)
         truth, _ = unforeseen.dropped(
             (world.vertices_m, world.triangles), world.bounds_m, self.gone_share, rng

@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import connected_components
 from uavexp.arrays import Bool, Float, Float32, Int, Int32
 from uavexp.errors import WorldError
 from uavexp.scene import Scene
-from uavexp.types import Surface, World
+from uavexp.types import ReferenceMap, World
 from uavexp.world import task
 from uavexp.world.boxes import Boxes
 
@@ -134,7 +134,7 @@ def parts_of(triangles: Int32, vertices: int) -> Int:
     return np.asarray(np.unique(label[triangles[:, 0]], return_inverse=True)[1], dtype=np.int64)
 
 
-def moved(reference: Surface, shift_m: float, turn_rad: float, rng: np.random.Generator) -> Surface:
+def moved(reference: ReferenceMap, shift_m: float, turn_rad: float, rng: np.random.Generator) -> ReferenceMap:
     """The reference map turned about its middle and shifted level; direction and sense are drawn."""
     bearing, sense = 2.0 * math.pi * rng.random(), 1.0 if rng.random() < 0.5 else -1.0
     if shift_m == 0.0 and turn_rad == 0.0:
@@ -146,7 +146,7 @@ def moved(reference: Surface, shift_m: float, turn_rad: float, rng: np.random.Ge
     return dataclasses.replace(reference, vertices_m=vertices.astype(np.float32))
 
 
-def with_reference(world: World, reference: Surface) -> World:
+def with_reference(world: World, reference: ReferenceMap) -> World:
     """The world with this map known before the flight; both are in its digest."""
     digest = hashlib.sha256(world.digest.encode())
     for array in (reference.vertices_m, reference.triangles, reference.inspected):

@@ -8,8 +8,8 @@ import numpy as np
 
 from uavexp.arrays import Float
 from uavexp.log import Replan
+from uavexp.map_change import changed_near
 from uavexp.trajectory import Trajectory, evaluate, sample_times
-from uavexp.trigger.change import changed_near
 from uavexp.types import Decision, Goal, Observation, PlanResult
 
 _NEAR_M, _CHANGED_M = 2.0, 0.15  # r_mon and delta_map of paper 1

@@ -6,8 +6,9 @@ from typing import Protocol
 
 import numpy as np
 
+from uavexp.scan import Scan
 from uavexp.scene import Scene
-from uavexp.types import Scan, State
+from uavexp.types import State
 
 
 class Sensor(Protocol):

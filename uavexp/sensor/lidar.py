@@ -24,8 +24,9 @@ from uavexp.arrays import Float, Float32
 from uavexp.errors import require
 from uavexp.geometry import rotation_from_quaternion
 from uavexp.parameters import NonNegative, Positive, Vector, at_least, below, between
+from uavexp.scan import RayScan
 from uavexp.scene import Scene
-from uavexp.types import RayScan, State
+from uavexp.types import State
 
 
 @dataclass(slots=True, kw_only=True)

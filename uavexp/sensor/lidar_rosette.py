@@ -19,9 +19,10 @@ import numpy as np
 
 from uavexp.arrays import Float, Float32
 from uavexp.parameters import Constraint, above, below, between, option
+from uavexp.scan import RayScan
 from uavexp.scene import Scene
 from uavexp.sensor.lidar import LidarParameters, take_scan
-from uavexp.types import RayScan, State
+from uavexp.types import State
 
 
 def rosette(times_s: Float, field_of_view_deg: float, prism_rates_hz: tuple[float, float]) -> Float32:

@@ -10,9 +10,10 @@ import numpy as np
 from uavexp.arrays import Float32
 from uavexp.errors import require
 from uavexp.parameters import between, option
+from uavexp.scan import RayScan
 from uavexp.scene import Scene
 from uavexp.sensor.lidar import LidarParameters, take_scan
-from uavexp.types import RayScan, State
+from uavexp.types import State
 
 
 @option

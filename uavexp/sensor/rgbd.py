@@ -32,8 +32,9 @@ from uavexp.arrays import Float, Float32
 from uavexp.errors import require
 from uavexp.geometry import rotation_from_quaternion
 from uavexp.parameters import NonNegative, Positive, Share, Vector, above, at_most, between, option
+from uavexp.scan import DepthScan
 from uavexp.scene import Scene
-from uavexp.types import DepthScan, State
+from uavexp.types import State
 
 
 @nb.njit(cache=True)

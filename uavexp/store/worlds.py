@@ -10,7 +10,7 @@ import numpy as np
 
 from uavexp.errors import RecordError
 from uavexp.store.logs import check_packed, pack, unpack
-from uavexp.types import Difficulty, Surface, World
+from uavexp.types import Difficulty, ReferenceMap, World
 
 
 def world_bytes(world: World) -> bytes:
@@ -47,7 +47,7 @@ def read_world(path: Path) -> World:
         known = "reference.triangles" in values
         return World(
             difficulty=_part(Difficulty, "difficulty", values),
-            reference=_part(Surface, "reference", values) if known else None,
+            reference=_part(ReferenceMap, "reference", values) if known else None,
             **values,
         )
     except (KeyError, TypeError) as error:

@@ -13,8 +13,9 @@ from dataclasses import field
 from uavexp import causes
 from uavexp.field import DistanceField
 from uavexp.parameters import Positive, option
+from uavexp.path_clearance import clearance_ahead_m
 from uavexp.trajectory import Trajectory
-from uavexp.trigger.validity import clearance_ahead_m, comes_near, ends_within, is_flown
+from uavexp.trigger.validity import comes_near, ends_within, is_flown
 from uavexp.types import Decision, Limits, Observation
 
 

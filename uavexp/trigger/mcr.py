@@ -28,10 +28,10 @@ from uavexp import causes
 from uavexp.arrays import Float, Int32
 from uavexp.errors import require
 from uavexp.field import DistanceField
+from uavexp.map_change import changed_near
 from uavexp.mapping.base import MapBackend
 from uavexp.parameters import Count, NonNegative, Positive, option
 from uavexp.trajectory import Trajectory, evaluate, sample_times
-from uavexp.trigger.change import changed_near
 from uavexp.types import Decision, Goal, Limits, Observation
 
 _SAMPLE_S = 0.05  # at 2.5 m/s about one voxel apart

@@ -6,7 +6,6 @@ what happens if nobody replans.
 
 from __future__ import annotations
 
-import math
 from typing import TypeGuard
 
 import numpy as np
@@ -16,7 +15,6 @@ from uavexp.field import UNKNOWN, DistanceField
 from uavexp.trajectory import Trajectory, evaluate
 from uavexp.types import Goal
 
-_SAMPLE_S = 0.05  # at 2.5 m/s about one voxel apart
 _SLACK_M = 0.03  # a third of a voxel: what the map's distances are exact to
 _TIME_S = 1e-9  # times are sums of steps
 
@@ -29,26 +27,6 @@ def is_flown(trajectory: Trajectory | None, now_s: float) -> TypeGuard[Trajector
 def is_older(trajectory: Trajectory, now_s: float, age_s: float) -> bool:
     """Whether a plan took effect so long ago, or longer."""
     return now_s - trajectory.start_s >= age_s - _TIME_S
-
-
-def clearance_ahead_m(
-    trajectory: Trajectory, field: DistanceField, now_s: float, horizon_s: float = math.inf
-) -> Float:
-    """Mapped distance (N,) at samples of the trajectory from now on.
-
-    Args:
-        trajectory: the one flown.
-        field: the map as it is now; unknown space is no obstacle in it.
-        now_s: trial time, s.
-        horizon_s: how far to look ahead, s.
-
-    Returns:
-        Signed distances, m, at most 0.05 s apart; the vehicle's own place first, the horizon or the end last.
-    """
-    begin_s = min(max(now_s, trajectory.start_s), trajectory.end_s)
-    end_s = min(trajectory.end_s, begin_s + horizon_s)
-    times_s = np.linspace(begin_s, end_s, 1 + math.ceil((end_s - begin_s) / _SAMPLE_S))
-    return field.distance_m(evaluate(trajectory, times_s)[0])
 
 
 def comes_near(clearance_m: Float, limit_m: float) -> bool:

@@ -27,7 +27,8 @@ from uavexp.check.scans import take_scan
 from uavexp.detection.clusters import cluster, split
 from uavexp.detection.returns import returns, without
 from uavexp.field import OCCUPIED, DistanceField
-from uavexp.types import Bodies, RayScan, Scan, Tracks
+from uavexp.scan import RayScan, Scan
+from uavexp.types import Bodies, Tracks
 
 ACROSS = straight((4.0, 1.2, 0.86), (0.0, 1.0, 0.0))
 

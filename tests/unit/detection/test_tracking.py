@@ -17,7 +17,8 @@ from uavexp.detection.tracker import Tracker, TrackRule, centres_m
 from uavexp.log import Contact, TrialLog
 from uavexp.metrics.metric import Flight, measured
 from uavexp.metrics.tracking_movers import METRICS, match, near_misses, predicted_errors_m, quality
-from uavexp.types import RayScan, Shape
+from uavexp.scan import RayScan
+from uavexp.types import Shape
 
 
 def still(times_s: Float) -> Float:

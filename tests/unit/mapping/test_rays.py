@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
 from tests.contract.test_mapping_contract import NOTHING, OPTIONS, begin, centres, occupied
+
 from uavexp.check.scans import Box, ring_directions, take_ray_scan, take_scan
 from uavexp.field import FREE, OCCUPIED, UNKNOWN
 from uavexp.mapping.dense import Dense
-from uavexp.types import RayScan
+from uavexp.scan import RayScan
 
 ROOM_M = np.array([[1.02, 1.07, 0.33], [6.96, 4.93, 2.71]])  # inner faces
 WALLS: list[Box] = [

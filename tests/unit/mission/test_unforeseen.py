@@ -14,7 +14,7 @@ from tests.logs import make_world
 from uavexp.errors import WorldError
 from uavexp.mission import unforeseen
 from uavexp.scene import Scene
-from uavexp.types import Surface, World
+from uavexp.types import ReferenceMap, World
 from uavexp.world import task
 
 WIDTH_M, HEIGHT_M, CLEARANCE_M = (0.3, 0.6), (1.3, 1.8), 0.4
@@ -39,9 +39,11 @@ def blocked(world: World, count: int, seed: int) -> World:
     return unforeseen.with_blocks(world, count, WIDTH_M, HEIGHT_M, CLEARANCE_M, rng)
 
 
-def surface(world: World) -> Surface:
+def surface(world: World) -> ReferenceMap:
     count = len(world.triangles)
-    return Surface(vertices_m=world.vertices_m, triangles=world.triangles, inspected=np.ones(count, np.bool_))
+    return ReferenceMap(
+        vertices_m=world.vertices_m, triangles=world.triangles, inspected=np.ones(count, np.bool_)
+    )
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -9,8 +9,8 @@ from tests.components import build
 from uavexp.arrays import Float32
 from uavexp.check.building import building, scene
 from uavexp.check.hall import hovering
+from uavexp.scan import RayScan
 from uavexp.seeding import Stream, generator
-from uavexp.types import RayScan
 
 
 def measured(sensor: str, seed: int) -> Float32:

@@ -11,7 +11,7 @@ import pytest
 from uavexp.check.hall import LIMITS, STRAIGHT, change, goal_at, observe, room
 from uavexp.errors import ConfigError
 from uavexp.field import DistanceField
-from uavexp.trigger.change import changed_near
+from uavexp.map_change import changed_near
 from uavexp.trigger.mcr import Mcr
 from uavexp.trigger.ssp import Ssp
 from uavexp.trigger.tbr import Tbr

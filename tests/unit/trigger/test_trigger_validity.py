@@ -13,18 +13,11 @@ from hypothesis import strategies as st
 from uavexp.braking import with_stop
 from uavexp.check.fields import box, empty, field_from
 from uavexp.check.hall import LIMITS, STRAIGHT, goal_at, observe, room
+from uavexp.path_clearance import clearance_ahead_m
 from uavexp.recorder import remaining_clearance_m
 from uavexp.trajectory import Trajectory, evaluate
 from uavexp.trigger.distance import flown_m
-from uavexp.trigger.validity import (
-    clearance_ahead_m,
-    comes_near,
-    ends_within,
-    goal_time_s,
-    is_flown,
-    is_older,
-    unknown_count,
-)
+from uavexp.trigger.validity import comes_near, ends_within, goal_time_s, is_flown, is_older, unknown_count
 
 PATHS = st.lists(st.floats(-0.5, 2.0), min_size=1, max_size=12).map(np.array)
 FLOWN = with_stop(STRAIGHT, LIMITS)  # as the pilot flies it: 1 m/s at x = 5.5 m, then to rest
