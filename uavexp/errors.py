@@ -1,10 +1,7 @@
 """Errors a user can mend: one line each, never a traceback."""
 
 import errno
-from enum import StrEnum
-from typing import TypeVar
 
-Option = TypeVar("Option", bound=StrEnum)
 _DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
@@ -51,12 +48,3 @@ def require_non_negative(**values: float) -> None:
     """Raise `ConfigError` unless every value is finite and >= 0."""
     for name, value in values.items():
         require(0.0 <= value < float("inf"), f"{name} must be >= 0 and finite, got {value}")
-
-
-def require_option(name: str, value: str, options: type[Option]) -> Option:
-    """Return the member of `options` that `value` names; raise `ConfigError` listing them."""
-    try:
-        return options(value)
-    except ValueError:
-        allowed = " | ".join(options)
-        raise ConfigError(f"{name} must be {allowed}, got {value!r}") from None

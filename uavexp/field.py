@@ -95,7 +95,7 @@ class DistanceField:
 
     distance = ±(exact distance between voxel centres - half a voxel), + in free and
     unknown space, - in obstacles, truncated at ±`max_distance_m`. Unknown is no obstacle.
-    The arrays are the map's own and change with it: read, do not keep; `copy()` to keep.
+    The arrays change with the map, and nobody can write into them here: do not keep them; `copy()` does.
     Voxel (i, j, k) has its centre at origin_m + (i + 0.5, j + 0.5, k + 0.5) * voxel_size_m.
     """
 
@@ -104,6 +104,12 @@ class DistanceField:
     max_distance_m: float
     distance: Float32  # (X, Y, Z) signed distance at voxel centres, m
     state: UInt8  # (X, Y, Z) UNKNOWN, FREE or OCCUPIED
+
+    def __post_init__(self) -> None:
+        for name in ("distance", "state"):
+            view = getattr(self, name).view()
+            view.flags.writeable = False
+            object.__setattr__(self, name, view)
 
     def distance_m(self, points_m: Float) -> Float:
         """Trilinear signed distance at points (N, 3) -> (N,); clamped to the grid's edge."""

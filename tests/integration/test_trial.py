@@ -18,7 +18,7 @@ from uavexp.geometry import rotation_from_quaternion
 from uavexp.scene import Scene
 from uavexp.trial import steps_per
 from uavexp.trigger.tbr import Tbr
-from uavexp.types import Decision, Outcome, PlanStatus
+from uavexp.types import Decision, Observation, Outcome, PlanStatus
 
 SMALL: Mapping[str, Any] = {
     "world": "random_columns",
@@ -174,4 +174,16 @@ def test_a_trigger_that_draws_from_the_global_generator_ends_the_flight(
 
     monkeypatch.setattr(Tbr, "decide", decide)
     with pytest.raises(ConfigError, match="numpy's global generator"):
+        fly(strategy="tbr")
+
+
+def test_a_trigger_cannot_change_the_map_that_it_looks_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What one wrote into the field, planner and safety used to take for measured."""
+
+    def decide(self: Tbr, observation: Observation) -> Decision:
+        observation.field.distance[:] = 9.0
+        return Decision(replan=False)
+
+    monkeypatch.setattr(Tbr, "decide", decide)
+    with pytest.raises(ValueError, match="read-only"):
         fly(strategy="tbr")

@@ -70,12 +70,14 @@ def forgets_the_last_trial_at_a_reset(make: Make) -> None:
 
 def copies_what_it_keeps_of_the_live_map(make: Make) -> None:
     """The map's arrays change under a plan: what is compared with later was copied."""
-    apart, policy, live = _begun(make), _begun(make), flight()[0].field.copy()
-    apart.planned(FLOWN, flight()[0].field)
+    apart, policy, first = _begun(make), _begun(make), flight()[0].field
+    distance, state = first.distance.copy(), first.state.copy()
+    live = replace(first, distance=distance, state=state)
+    apart.planned(FLOWN, first)
     policy.planned(FLOWN, live)
     have, want = [], []
     for observation in flight():
-        live.distance[:], live.state[:] = observation.field.distance, observation.field.state
+        distance[:], state[:] = observation.field.distance, observation.field.state
         have.append(policy.decide(replace(observation, field=live)))
         want.append(apart.decide(observation))
     _keep_same(have, want, "on a map that changes in place")

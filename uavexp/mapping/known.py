@@ -114,6 +114,7 @@ class Known(FieldParameters):
     _esdf: SignedDistance = dataclasses.field(init=False, repr=False)
     _field: DistanceField = dataclasses.field(init=False, repr=False)
     _made: UInt8 = dataclasses.field(init=False, repr=False)  # state as of the next update
+    _state: UInt8 = dataclasses.field(init=False, repr=False)  # of the field
 
     def __post_init__(self) -> None:
         FieldParameters.__post_init__(self)
@@ -132,13 +133,13 @@ class Known(FieldParameters):
         shape = grid_shape(bounds_m, self.voxel_size_m, self.max_memory_mb, _BYTES_PER_VOXEL)
         self._scene = scene
         self._esdf = SignedDistance(shape, self.voxel_size_m, self.max_distance_m)
-        self._made = np.zeros(shape, np.uint8)
+        self._made, self._state = np.zeros(shape, np.uint8), np.zeros(shape, np.uint8)
         self._field = DistanceField(
             origin_m=np.array(bounds_m[0], dtype=np.float64),
             voxel_size_m=self.voxel_size_m,
             max_distance_m=self.max_distance_m,
             distance=self._esdf.distance,
-            state=np.zeros(shape, np.uint8),
+            state=self._state,
         )
 
     def mark_free(self, centre_m: Float, radius_m: float) -> None:
@@ -160,11 +161,11 @@ class Known(FieldParameters):
     def update(self, time_s: float) -> MapUpdate:
         """Return what changed since the last call: everything, first seen, at the first one."""
         self._begun()
-        before, after = self._field.state.reshape(-1), self._made.reshape(-1)
+        before, after = self._state.reshape(-1), self._made.reshape(-1)
         flipped = np.flatnonzero((before == OCCUPIED) != (after == OCCUPIED)).astype(np.int32)
         first_seen = np.flatnonzero((before == 0) & (after != 0)).astype(np.int32)
         before[:] = after
-        return self._esdf.update(time_s, self._field.state, flipped, first_seen)
+        return self._esdf.update(time_s, self._state, flipped, first_seen)
 
     @property
     def field(self) -> DistanceField:

@@ -252,4 +252,5 @@ class OccupancyMap:
         """Bring state and field up to what was integrated; return what changed since last time."""
         flips, firsts = _publish(self.voxels, self.changed, self._flipped, self._first_seen)
         self.changed = 0
-        return self._esdf.update(time_s, self.field.state, self._flipped[:flips], self._first_seen[:firsts])
+        state = self.voxels.state.reshape(self.shape)
+        return self._esdf.update(time_s, state, self._flipped[:flips], self._first_seen[:firsts])

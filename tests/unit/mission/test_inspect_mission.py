@@ -126,15 +126,16 @@ def test_all_goals_rejected_twice_end_the_inspection() -> None:
 
 def test_viewpoints_that_the_live_map_blocks_are_left_out() -> None:
     _, guide = begun(rounds=0)
-    live = HALL.field.copy()
+    live = HALL.field
+    distance, state = live.distance.copy(), live.state.copy()
     places = guide.plan.viewpoints.position_m
     near = np.linalg.norm(places - places[guide.plan.order[1]], axis=1) < 0.5
     centres = live.voxel_centres_m(np.arange(live.distance.size))
     for place in places[near]:
         ball = (np.linalg.norm(centres - place, axis=1) < 0.25).reshape(live.distance.shape)
-        live.state[ball] = OCCUPIED
-        live.distance[ball] = -0.05
-    goals = visit(guide, live)
+        state[ball] = OCCUPIED
+        distance[ball] = -0.05
+    goals = visit(guide, replace(live, distance=distance, state=state))
     assert np.isinf(guide.visited_s[near]).all()
     assert np.isfinite(guide.visited_s[~near]).all()
     assert not any((goal.position_m == places[near]).all(axis=1).any() for goal in goals)

@@ -10,7 +10,7 @@ import pytest
 from tests.unit.trigger.test_trigger import LIMITS, STRAIGHT, change, observe
 from uavexp.braking import stopping_distance_m
 from uavexp.check.fields import box, empty, field_from
-from uavexp.field import UNKNOWN, DistanceField
+from uavexp.field import DistanceField
 from uavexp.safety.brake import Brake
 from uavexp.safety.none import NoBrake
 from uavexp.trajectory import evaluate
@@ -29,10 +29,7 @@ def flying(field: DistanceField, time_s: float) -> Observation:
 def walled(x_m: float, *, unknown: bool = False) -> DistanceField:
     grid = empty((7.0, 4.0, 2.0))
     box(grid, (x_m, 0.0, 0.0), (7.0, 4.0, 2.0))
-    field = field_from(np.zeros_like(grid) if unknown else grid)
-    if unknown:
-        field.state[grid] = UNKNOWN
-    return field
+    return field_from(np.zeros_like(grid), unknown=grid) if unknown else field_from(grid)
 
 
 def first_brake_m(brake: Brake, field: DistanceField) -> float:

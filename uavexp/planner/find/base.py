@@ -41,4 +41,3 @@ class Finder(Protocol):
             constraints: what the path keeps.
             rng: all that is drawn comes from here; in the same state at every request of a trial.
         """
-        ...

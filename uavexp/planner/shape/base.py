@@ -46,4 +46,3 @@ class Shaper(Protocol):
             constraints: limits and clearances to be kept.
             movers: where they are predicted, and what is to be kept from them; may be none.
         """
-        ...

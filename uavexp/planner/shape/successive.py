@@ -83,31 +83,24 @@ class Model(Protocol):
 
     def guess(self, points_m: Float, times_s: Float, duration_s: float) -> Float:
         """Control points (N, 3) along a timed polyline (P, 3), flown in this duration."""
-        ...
 
     def pin(self, curve: Curve) -> Curve:
         """Give a curve its end states, in place."""
-        ...
 
     def improve(self, curve: Curve, rounds: int) -> tuple[Curve, bool, int]:
         """Solve up to `rounds` QPs: the last iterate, whether the last QP was feasible, and their number."""
-        ...
 
     def points(self, curve: Curve) -> Float:
         """Points (P, 3) along it, dense."""
-        ...
 
     def excess(self, curve: Curve) -> float:
         """By what factor its duration is too short; <= 1 when the limits are kept."""
-        ...
 
     def shortfall(self, curve: Curve) -> str:
         """Where it is not clear; "" when it is."""
-        ...
 
     def trajectory(self, curve: Curve) -> Trajectory:
         """As it is flown."""
-        ...
 
 
 def route_of(request: PlanRequest, path_m: Float, z_band_m: float) -> Route:
