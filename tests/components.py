@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from typing import Any
 
 from hydra.utils import get_class
@@ -29,8 +28,3 @@ def build(group: str, option: str, **changes: Any) -> Any:
         parameter, name = place.split(".")
         values[parameter][name] = build(group, part)
     return get_class(values.pop("_target_"))(**(values | changes))
-
-
-def numbers(component: Any) -> list[str]:
-    """Names of the float parameters of a component."""
-    return [f.name for f in dataclasses.fields(component) if f.init and type(f.default) is float]
