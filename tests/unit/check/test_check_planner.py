@@ -101,7 +101,7 @@ def gambling(request: PlanRequest, asked: int) -> PlanResult:
 
 
 def writing(request: PlanRequest, asked: int) -> PlanResult:
-    request.flight_bounds_m[0, 0] -= 1.0
+    request.field.distance[0, 0, 0] += 1.0
     return honest(request, asked)
 
 
