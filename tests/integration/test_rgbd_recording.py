@@ -8,9 +8,9 @@ import matplotlib.image
 import numpy as np
 import pytest
 from scipy.ndimage import distance_transform_edt
-from tests.contract.test_mapping_contract import NOTHING, OPTIONS, build
 
 from tests.folders import SHARED as DATA
+from tests.maps import FUSING, NOTHING
 from uavexp.arrays import Float
 from uavexp.field import FREE, OCCUPIED, UNKNOWN
 from uavexp.mapping.base import MapBackend
@@ -61,8 +61,8 @@ def scans() -> tuple[list[DepthScan], list[DepthScan]]:
 @pytest.fixture(scope="module")
 def maps(scans) -> dict[str, MapBackend]:
     built = {}
-    for path in OPTIONS:
-        backend = build(path, voxel_size_m=0.05, truncation_m=0.15, occupied_below_m=0.0125,
+    for name, fusing in FUSING.items():
+        backend = fusing(voxel_size_m=0.05, truncation_m=0.15, occupied_below_m=0.0125,
                         free_above_m=0.05, solid_depth_m=0.125, max_distance_m=1.0)  # fmt: skip
         backend.reset(BOUNDS_M, NOTHING)
         for n, scan in enumerate(scans[0]):
@@ -70,7 +70,7 @@ def maps(scans) -> dict[str, MapBackend]:
             if n % 2 == 1:
                 backend.update(0.05 * n)
         backend.update(0.05 * len(scans[0]))
-        built[path.stem] = backend
+        built[name] = backend
     return built
 
 
@@ -89,7 +89,7 @@ def voxels(backend: MapBackend, points_m: Float) -> tuple[np.ndarray, ...]:
     return tuple(index[inside].T)
 
 
-@pytest.mark.parametrize("name", [path.stem for path in OPTIONS])
+@pytest.mark.parametrize("name", FUSING)
 def test_surface_lies_where_held_out_frames_measure_it(maps, scans, name):
     backend = maps[name]
     from_surface = distance_transform_edt(backend.field.state != OCCUPIED)  # voxels
@@ -99,7 +99,7 @@ def test_surface_lies_where_held_out_frames_measure_it(maps, scans, name):
     assert (gap <= 1.0).mean() > 0.98  # the reference mesh, at 2 cm, hits within 5 cm in 95 %
 
 
-@pytest.mark.parametrize("name", [path.stem for path in OPTIONS])
+@pytest.mark.parametrize("name", FUSING)
 def test_rays_of_held_out_frames_run_through_free_space(maps, scans, name):
     backend = maps[name]
     states = []

@@ -6,15 +6,13 @@ import numpy as np
 import pytest
 
 from tests.exact_distance import exact_field
+from tests.maps import BOUNDS_M, FUSING, NOTHING, begin, centres, occupied
 from uavexp.check.scans import Box, take_scan
 from uavexp.errors import ConfigError
 from uavexp.field import FREE, OCCUPIED, UNKNOWN
 from uavexp.mapping.base import MapBackend
-from uavexp.mapping.dense import Dense
 from uavexp.mapping.voxel_block_grid import VoxelBlockGrid
-from uavexp.scene import Scene
 
-BOUNDS_M = np.array([[0.0, 0.0, 0.0], [8.0, 6.0, 3.0]])
 CAMERA_M = (0.55, 3.05, 1.45)
 WALL_M = 3.0  # x of the near face
 WALL: Box = ((WALL_M, -1.0, -1.0), (WALL_M + 1.0, 7.0, 4.0))
@@ -24,28 +22,11 @@ ROOM: list[Box] = [
     ((2.4, 1.1, 0.0), (3.1, 2.0, 1.7)),
     ((3.3, 3.9, 0.0), (3.7, 5.2, 2.6)),
 ]
-NOTHING = Scene.from_mesh(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32))
-FUSING = {"dense": Dense, "voxel_block_grid": VoxelBlockGrid}
-
-
-def begin(option: str, **changes: object) -> MapBackend:
-    backend = FUSING[option](**changes)
-    backend.reset(BOUNDS_M, NOTHING)
-    return backend
 
 
 @pytest.fixture(params=FUSING)
 def option(request) -> str:
     return request.param
-
-
-def occupied(backend: MapBackend) -> np.ndarray:
-    return backend.field.state == OCCUPIED
-
-
-def centres(backend: MapBackend) -> np.ndarray:
-    shape = backend.field.distance.shape
-    return backend.field.voxel_centres_m(np.arange(np.prod(shape))).reshape(*shape, 3)
 
 
 def fly_past(backend: MapBackend, boxes: list[Box], *, frames: int = 24, noise=None):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tests.contract.test_mapping_contract import NOTHING, OPTIONS, begin, centres, occupied
 
+from tests.maps import FUSING, NOTHING, begin, centres, occupied
 from uavexp.check.scans import Box, ring_directions, take_ray_scan, take_scan
 from uavexp.field import FREE, OCCUPIED, UNKNOWN
 from uavexp.mapping.dense import Dense
@@ -27,7 +27,7 @@ SENSOR_M = (2.3, 3.0, 1.4)
 ALL_AROUND = ring_directions()
 
 
-@pytest.fixture(params=OPTIONS, ids=lambda path: path.stem)
+@pytest.fixture(params=FUSING)
 def option(request):
     return request.param
 
@@ -146,12 +146,9 @@ def test_the_order_of_the_rays_does_not_matter(option):
     np.testing.assert_array_equal(backends[0].field.distance, backends[1].field.distance)
 
 
-@pytest.mark.parametrize(
-    "path", [path for path in OPTIONS if path.stem != "dense"], ids=lambda path: path.stem
-)
-def test_backends_agree_also_when_rays_and_images_alternate(path):
+def test_backends_agree_also_when_rays_and_images_alternate():
     """Tolerance as for images alone: what lies on the border of a pixel is seen differently in 32 bits."""
-    other, dense = begin(path), begin(path.parent / "dense.yaml")
+    other, dense = begin("voxel_block_grid"), begin("dense")
     for backend in (other, dense):
         for _ in range(4):
             backend.integrate(take_ray_scan([*WALLS, BALL], SENSOR_M, ALL_AROUND[::3]))
