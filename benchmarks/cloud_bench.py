@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from uavexp.arrays import Float
+from uavexp.cloud.cloud_file import read_cloud
 from uavexp.cloud.pipeline import CloudPipeline
-from uavexp.cloud.points import read_cloud
-from uavexp.cloud.scan import simulated_scan
+from uavexp.cloud.simulated_scan import simulated_scan
 from uavexp.o3d import open3d
 from uavexp.scene import Scene
 from uavexp.seeding import Stream, generator

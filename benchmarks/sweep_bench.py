@@ -16,12 +16,12 @@ from rich.console import Console
 from uavexp.config.composition import Composer
 from uavexp.config.overrides import parse_settings
 from uavexp.sweep.agenda import agenda_of
-from uavexp.sweep.job import Job, Limits
+from uavexp.sweep.job import Allowance, Job
 from uavexp.sweep.local import run_local, start_fork_server
 from uavexp.sweep.trial_job import fly_job
 
 SEEDS = "0:8"
-LIMITS = Limits(timeout_s=600.0, memory_mb=4096.0)
+LIMITS = Allowance(timeout_s=600.0, memory_mb=4096.0)
 
 
 def seconds(jobs: list[Job], n_jobs: int) -> float:

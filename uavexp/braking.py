@@ -17,6 +17,7 @@ from uavexp.geometry import GRAVITY_MPS2
 from uavexp.trajectory import Trajectory, evaluate, join
 from uavexp.types import Limits
 
+REST_MPS = 0.05  # slower is standing
 _SHORTEST_PIECE_S = 1e-6
 _HOLD_S = 0.1  # length of the trajectory of a vehicle that already stands
 

@@ -40,6 +40,9 @@ from uavexp.types import (
     World,
 )
 
+_Step = tuple[float, Float, Float, Float, Float, Float, Float]
+_Tick = tuple[float, float, int, float, float]
+
 
 @dataclass(slots=True)
 class Stopwatch:
@@ -65,8 +68,8 @@ class Stopwatch:
 class Recorder:
     """Rows of the log: one per step, one per ESDF update, and the goals pursued."""
 
-    steps: list[tuple[float, Float, Float, Float, Float, Float, Float]] = field(default_factory=list)
-    ticks: list[tuple[float, float, int, float, float]] = field(default_factory=list)
+    steps: list[_Step] = field(default_factory=list)
+    ticks: list[_Tick] = field(default_factory=list)
     goals_m: list[Float] = field(default_factory=list)
     bodies: list[Bodies] = field(default_factory=list)  # one per step
     tracks: list[Tracks] = field(default_factory=list)  # one per ESDF update
@@ -129,36 +132,15 @@ class Recorder:
         watch: Stopwatch,
     ) -> TrialLog:
         """Return the finished log; true clearances are measured here, all at once."""
-        times, position, velocity, quaternion, estimated, reference, acceleration = zip(
-            *self.steps, strict=True
-        )
-        tick_s, esdf_m, changed, score, remaining_m = zip(*self.ticks, strict=True)
         mapped = np.flatnonzero(field.state == OCCUPIED)
-        fixed_m, mover_m = (
-            scene.fixed_distance_m(np.stack(position)),
-            _mover_distance_m(position, self.bodies),
-        )
+        position_m = np.stack([row[1] for row in self.steps])
+        fixed_m, mover_m = scene.fixed_distance_m(position_m), _mover_distance_m(position_m, self.bodies)
         return TrialLog(
             outcome=outcome,
             reason=reason,
             step_s=step_s,
-            steps=Steps(
-                time_s=np.array(times),
-                position_m=np.stack(position),
-                velocity_mps=np.stack(velocity),
-                quaternion_wxyz=np.stack(quaternion),
-                estimated_position_m=np.stack(estimated),
-                reference_position_m=np.stack(reference),
-                reference_acceleration_mps2=np.stack(acceleration),
-                clearance_m=np.minimum(fixed_m, mover_m) if mover_m.size else fixed_m,
-            ),
-            ticks=Ticks(
-                tick_s=np.array(tick_s),
-                esdf_clearance_m=np.array(esdf_m),
-                changed_voxels=np.array(changed, dtype=np.int64),
-                decision_score=np.array(score),
-                remaining_clearance_m=np.array(remaining_m),
-            ),
+            steps=_step_rows(self.steps, np.minimum(fixed_m, mover_m) if mover_m.size else fixed_m),
+            ticks=_tick_rows(self.ticks),
             replans=replans,
             dropped_triggers=dropped_triggers,
             contacts=contacts,
@@ -176,6 +158,31 @@ class Recorder:
             inspection=inspection,
             wall_s={name: np.array(laps) for name, laps in watch.laps_s.items()},
         )
+
+
+def _step_rows(rows: Sequence[_Step], clearance_m: Float) -> Steps:
+    times_s, position, velocity, quaternion, estimated, reference, acceleration = zip(*rows, strict=True)
+    return Steps(
+        time_s=np.array(times_s),
+        position_m=np.stack(position),
+        velocity_mps=np.stack(velocity),
+        quaternion_wxyz=np.stack(quaternion),
+        estimated_position_m=np.stack(estimated),
+        reference_position_m=np.stack(reference),
+        reference_acceleration_mps2=np.stack(acceleration),
+        clearance_m=clearance_m,
+    )
+
+
+def _tick_rows(rows: Sequence[_Tick]) -> Ticks:
+    tick_s, esdf_m, changed, score, remaining_m = zip(*rows, strict=True)
+    return Ticks(
+        tick_s=np.array(tick_s),
+        esdf_clearance_m=np.array(esdf_m),
+        changed_voxels=np.array(changed, dtype=np.int64),
+        decision_score=np.array(score),
+        remaining_clearance_m=np.array(remaining_m),
+    )
 
 
 def _mover_rows(bodies: Sequence[Bodies], clearance_m: Float) -> MoverRows:
@@ -209,7 +216,7 @@ def _first_plan(plan: PlanResult | None) -> FirstPlan:
     )
 
 
-def _mover_distance_m(position_m: Sequence[Float], bodies: Sequence[Bodies]) -> Float:
+def _mover_distance_m(position_m: Float, bodies: Sequence[Bodies]) -> Float:
     """Distance (T,) of the body's centre to the nearest mover, step by step; empty without movers."""
     if not len(bodies[0]):
         return np.zeros(0)

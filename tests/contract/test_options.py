@@ -155,21 +155,21 @@ def test_a_preset_only_overrides(preset: str) -> None:
     assert cell.strategy == preset
 
 
-def test_presets_differ_in_the_trigger_and_in_the_goal_of_a_single_shot_only() -> None:
-    """Those of the other papers are apart: movers with another sensor, another planner."""
-    alike = [preset for preset in PRESETS if preset not in ("risk", "bspline_mpc", "inspect")]
-    cells = [COMPOSER.cell(parse_settings([f"{PRESET_GROUP}={preset}"])) for preset in alike]
-    shared = [
-        {
-            key: value
-            for key, value in cell.config.items()
-            if key != "trigger" and not (key == "explorer" and cell.strategy == "ssp")
-        }
-        for cell in cells
+@pytest.mark.parametrize("preset", PRESETS)
+def test_a_preset_is_what_it_names_and_nothing_else(preset: str) -> None:
+    """The same flight as when its options and values are typed; all else is the default."""
+    tree = yaml.safe_load((CONF / PRESET_GROUP / f"{preset}.yaml").read_text())
+    typed = [
+        f"{key.removeprefix('override /')}={option}"
+        for item in tree.pop("defaults")
+        for key, option in item.items()
     ]
-    longest = max(shared, key=len)
-    assert all(part == {key: longest[key] for key in part} for part in shared)
-    assert len({repr(cell.config["trigger"]) for cell in cells}) == len(cells)
+    for key, value in tree.items():
+        inner = value.items() if isinstance(value, dict) else [("", value)]
+        typed += [f"{key}{'.' if name else ''}{name}={item}" for name, item in inner]
+    assert COMPOSER.cell(parse_settings(typed)).config == (
+        COMPOSER.cell(parse_settings([f"{PRESET_GROUP}={preset}"])).config
+    )
 
 
 def test_every_module_with_a_component_has_its_yaml() -> None:

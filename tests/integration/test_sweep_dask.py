@@ -18,10 +18,10 @@ from uavexp.__main__ import main
 from uavexp.errors import ConfigError
 from uavexp.store.records import Status
 from uavexp.sweep.dask import differing_packages, run_dask, slurm_cluster
-from uavexp.sweep.job import Done, Job, Limits
+from uavexp.sweep.job import Allowance, Done, Job
 
 distributed = pytest.importorskip("distributed", reason="Dask is an extra: pip install 'uavexp[dask]'")
-LIMITS = Limits(timeout_s=60.0, memory_mb=1000.0)
+LIMITS = Allowance(timeout_s=60.0, memory_mb=1000.0)
 STUDY = (*QUICK, "strategy=mcr,tbr", "seed=0:2")
 
 

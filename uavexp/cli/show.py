@@ -7,13 +7,13 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from uavexp.config.composition import Command, Composer
+from uavexp.config.composition import CommandLine, Composer
 from uavexp.config.trust import trusted_packages
 from uavexp.paths import PACKAGE, conf_folder, outputs_root
 from uavexp.store.records import code_digest, lock_digest
 
 
-def config_text(composer: Composer, command: Command, part: str) -> str:
+def config_text(composer: Composer, command: CommandLine, part: str) -> str:
     """The composed configuration of every cell as yaml documents.
 
     Args:

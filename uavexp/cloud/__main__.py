@@ -9,8 +9,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from uavexp.cloud.cloud_file import read_cloud
 from uavexp.cloud.pipeline import CloudPipeline
-from uavexp.cloud.points import read_cloud
 from uavexp.errors import UavexpError
 
 

@@ -13,11 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from uavexp.arrays import Bool, Float
+from uavexp.cloud.cloud_file import CloudError, checked
 from uavexp.cloud.outliers import outliers
 from uavexp.cloud.planes import Plane, fit_planes, plane_of
-from uavexp.cloud.points import CloudError, checked
 from uavexp.cloud.traversability import obstacles
-from uavexp.cloud.voxels import Voxels, voxelise
+from uavexp.cloud.voxels import CloudVoxels, voxelise
 from uavexp.errors import require, require_positive
 
 _LEAST_POINTS = 3  # a plane's
@@ -44,7 +44,7 @@ class CloudCounts:
 class CloudModel(NamedTuple):
     """Answer of the pipeline."""
 
-    voxels: Voxels
+    voxels: CloudVoxels
     obstacle: Bool  # (V,)
     planes: tuple[Plane, ...]
     counts: CloudCounts

@@ -7,14 +7,14 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from uavexp.arrays import Bool
-from uavexp.cloud.voxels import Voxels, packed
+from uavexp.cloud.voxels import CloudVoxels, packed
 
 _HALF_AROUND = np.array(
     [(i, j, k) for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1) if (i, j, k) > (0, 0, 0)]
 )  # 13 of the 26 neighbours: the others are the same pairs
 
 
-def obstacles(voxels: Voxels, least_voxels: int) -> Bool:
+def obstacles(voxels: CloudVoxels, least_voxels: int) -> Bool:
     """Voxels (V,) that are not traversable: those of a joined group, by 26 neighbours, large enough.
 
     Args:

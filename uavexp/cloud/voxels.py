@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from uavexp.arrays import Float, Int
-from uavexp.cloud.points import CloudError
+from uavexp.cloud.cloud_file import CloudError
 
 _CHUNK = 1_000_000  # points sorted into voxels at once
 _BITS = 20  # of a voxel's index along an axis: a million voxels
@@ -15,7 +15,7 @@ _HALF = 1 << (_BITS - 1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Voxels:
+class CloudVoxels:
     """Non-empty voxels, in ascending order of their keys."""
 
     voxel_size_m: float
@@ -41,7 +41,7 @@ def unpacked(key: Int) -> Int:
     return np.stack([key >> 2 * _BITS, key >> _BITS & mask, key & mask], axis=1) - _HALF
 
 
-def voxelise(points_m: Float, voxel_size_m: float) -> Voxels:
+def voxelise(points_m: Float, voxel_size_m: float) -> CloudVoxels:
     """Sort points (N, 3) into voxels.
 
     Raises:
@@ -59,7 +59,7 @@ def voxelise(points_m: Float, voxel_size_m: float) -> Voxels:
         keys, place = np.unique(np.concatenate([keys, mine]), return_inverse=True)
         columns = [np.bincount(place, rows[:, n], len(keys)) for n in range(4)]
         sums = np.column_stack(columns)
-    return Voxels(
+    return CloudVoxels(
         voxel_size_m=voxel_size_m,
         key=keys,
         centroid_m=sums[:, :3] / sums[:, 3:],

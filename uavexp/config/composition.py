@@ -44,7 +44,7 @@ class Cell:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Command:
+class CommandLine:
     """What one command line asks for."""
 
     cells: tuple[Cell, ...]
@@ -74,7 +74,7 @@ class Composer:
         self._keys = (*GROUPS, *(item.name for item in shared), RUNNER_GROUP, "hydra")
         self._trees = Trees(user_folder=self.user_folder)
 
-    def command(self, settings: Sequence[Setting]) -> Command:
+    def command(self, settings: Sequence[Setting]) -> CommandLine:
         """Expand, compose and check everything a command line asks for.
 
         Raises:
@@ -96,7 +96,7 @@ class Composer:
         out = ours["out"].values if "out" in ours else (defaults["out"],)
         if len(out) != 1 or not isinstance(out[0], str | None) or out[0] == "":
             raise ConfigError(f"out must be one folder, got {', '.join(map(repr, out))}")
-        return Command(
+        return CommandLine(
             cells=cells,
             seeds=seeds,
             out=out[0],

@@ -33,7 +33,7 @@ _UPRIGHT = 0.1  # q upwards over q level: little that moves in a building climbs
 _EXPECTED = 3.0  # of the normalised innovation squared of a position
 
 
-class Motion(NamedTuple):
+class MotionModel(NamedTuple):
     """What the filter assumes, SI."""
 
     position_noise_m: float = 0.08  # of an observed centre, standard deviation per level axis
@@ -70,7 +70,7 @@ def _step(period_s: float) -> tuple[Float, Float]:
     return transition, noise
 
 
-def _new_filter(position_m: Float, motion: Motion) -> Any:
+def _new_filter(position_m: Float, motion: MotionModel) -> Any:
     """A filterpy filter that has seen one position."""
     from filterpy.kalman import KalmanFilter  # a second of import that flights without movers are spared
 
@@ -88,7 +88,7 @@ class MotionFilter:
     """The filter of one mover; begins at an observed position, at rest."""
 
     first_m: Float  # (3,)
-    motion: Motion
+    motion: MotionModel
     misfit: float = 1.0  # fading average of the normalised innovation squared over its expectation
     _kalman: Any = field(init=False, repr=False)
     _seen_m: Float = field(init=False, repr=False)  # (3,) last observed
@@ -167,7 +167,10 @@ class MotionFilter:
 
 
 def estimated(
-    times_s: Float, positions_m: Float, motion: Motion | None = None, of: Estimate = Estimate.KALMAN
+    times_s: Float,
+    positions_m: Float,
+    motion: MotionModel | None = None,
+    of: Estimate = Estimate.KALMAN,
 ) -> tuple[Float, Float]:
     """Position and velocity, each (K, 3), that are believed at each observation.
 
@@ -184,7 +187,7 @@ def estimated(
             filter_.predict(float(times_s[k] - times_s[k - 1]))
             filter_.observe(position_m)
         elif np.isfinite(position_m).all():
-            filter_ = MotionFilter(position_m, motion or Motion())
+            filter_ = MotionFilter(position_m, motion or MotionModel())
         if filter_ is not None:
             believed[:, k] = filter_.estimate(of)
     return believed[0], believed[1]

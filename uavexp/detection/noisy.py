@@ -12,7 +12,7 @@ import numpy as np
 
 from uavexp.arrays import Int
 from uavexp.bodies import present
-from uavexp.detection.kalman import FilterParameters, Motion, MotionFilter
+from uavexp.detection.kalman import FilterParameters, MotionFilter, MotionModel
 from uavexp.detection.returns import without_bodies
 from uavexp.field import DistanceField
 from uavexp.parameters import NonNegative, option
@@ -57,7 +57,7 @@ class Noisy(FilterParameters):
         if self._rng is None:
             raise RuntimeError("reset() must come first")
         noise_m = self._rng.normal(0.0, self.position_noise_m, truth.position_m.shape)
-        motion = Motion(
+        motion = MotionModel(
             position_noise_m=self.position_noise_m,
             height_noise_m=self.position_noise_m,
             acceleration_density=self.acceleration_density,

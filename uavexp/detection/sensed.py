@@ -25,7 +25,7 @@ import numpy as np
 
 from uavexp.arrays import Bool, Float
 from uavexp.detection.clusters import cluster, split
-from uavexp.detection.kalman import FilterParameters, Motion
+from uavexp.detection.kalman import FilterParameters, MotionModel
 from uavexp.detection.returns import free_at, returns, viewpoint_m, without
 from uavexp.detection.tracker import Tracker, TrackRule
 from uavexp.field import DistanceField
@@ -72,7 +72,7 @@ class Sensed(FilterParameters):
             coast_s=self.coast_s,
             max_speed_mps=self.max_speed_mps,
             max_deviation_m=self.max_deviation_m,
-            motion=Motion(
+            motion=MotionModel(
                 position_noise_m=self.position_noise_m,
                 acceleration_density=self.acceleration_density,
                 adaptivity=self.adaptivity,

@@ -24,7 +24,7 @@ import numpy as np
 
 from uavexp.arrays import Bool, Float, Int
 from uavexp.detection.clusters import Clusters
-from uavexp.detection.kalman import Estimate, Motion, MotionFilter
+from uavexp.detection.kalman import Estimate, MotionFilter, MotionModel
 from uavexp.detection.returns import viewpoint_m
 from uavexp.detection.sight import seen_empty
 from uavexp.field import DistanceField
@@ -49,7 +49,7 @@ class TrackRule(NamedTuple):
     coast_s: float
     max_speed_mps: float
     max_deviation_m: float
-    motion: Motion
+    motion: MotionModel
     estimate: Estimate = Estimate.KALMAN
 
 

@@ -58,15 +58,11 @@ def path_lengths(passable: Bool, cost: Int32, source: tuple[int, int], wanted: I
     following = np.full(nx * ny, -1, dtype=np.int32)  # bucket lists, doubly linked
     previous = np.full(nx * ny, -1, dtype=np.int32)
     head = np.full(_BUCKETS, -1, dtype=np.int32)
-    missing = 0
     asked = np.zeros(nx * ny, dtype=np.bool_)
-    for cell in wanted:
-        missing += not asked[cell]
-        asked[cell] = True
+    asked[wanted] = True
+    missing = np.count_nonzero(asked)
     start = source[0] * ny + source[1]
-    length[start] = 0
-    head[0] = start
-    waiting, now = 1, 0
+    length[start], head[0], waiting, now = 0, start, 1, 0
     while waiting > 0:
         slot = now % _BUCKETS
         flat = head[slot]

@@ -17,8 +17,8 @@ import numpy as np
 from uavexp.arrays import Float, Float32
 from uavexp.field import DistanceField
 from uavexp.mapping.frustum import column_depths, frustum_box
-from uavexp.mapping.occupancy import OccupancyMap, Rule, Voxels, observe, reciprocals
-from uavexp.mapping.parameters import MapParameters
+from uavexp.mapping.map_parameters import MapParameters
+from uavexp.mapping.occupancy import FusionRule, OccupancyMap, Voxels, observe, reciprocals
 from uavexp.mapping.rays import integrate_rays
 from uavexp.parameters import option
 from uavexp.scan import RayScan, Scan
@@ -73,7 +73,7 @@ def _visible_part(
 @nb.njit(cache=True)
 def integrate_scan(
     voxels: Voxels, depth: Float32, intrinsics: Float, max_range_m: float, rotation: Float,
-    corner: Float, voxel_m: float, rule: Rule, count: int,
+    corner: Float, voxel_m: float, rule: FusionRule, count: int,
 ) -> int:  # fmt: skip
     """Fuse one depth image; returns how many voxels now stand in `changes`.
 

@@ -22,8 +22,8 @@ from uavexp.arrays import Bool, Float, Float32, Int, UInt8
 from uavexp.errors import require
 from uavexp.field import FREE, OCCUPIED, DistanceField
 from uavexp.mapping.esdf import SignedDistance
+from uavexp.mapping.map_parameters import FieldParameters
 from uavexp.mapping.occupancy import grid_shape
-from uavexp.mapping.parameters import FieldParameters
 from uavexp.parameters import NonNegative, option
 from uavexp.scan import Scan
 from uavexp.scene import Scene

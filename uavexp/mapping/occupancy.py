@@ -47,7 +47,7 @@ _LONGEST = 30_000  # voxels along an axis: kernels count them in 16 bits
 _BYTES_PER_VOXEL = 58  # TSDF and state 7, ESDF 19, lists at their longest 16, rays 8, Open3D's blocks 8
 
 
-class Rule(NamedTuple):
+class FusionRule(NamedTuple):
     """The fusion and occupancy rule in the form that kernels take; see the module's text."""
 
     truncation_m: float
@@ -73,7 +73,7 @@ class Voxels(NamedTuple):
 
 
 @nb.njit(cache=True, inline="always")
-def keeps_free(observed_m: float, fused_m: float, weight: int, byte: int, rule: Rule) -> bool:
+def keeps_free(observed_m: float, fused_m: float, weight: int, byte: int, rule: FusionRule) -> bool:
     """Whether an observation from behind a surface must not touch a voxel measured to be free."""
     return (
         observed_m < -rule.free_above_m
@@ -85,7 +85,7 @@ def keeps_free(observed_m: float, fused_m: float, weight: int, byte: int, rule: 
 
 @nb.njit(cache=True, inline="always")
 def judge(
-    observed_m: float, fused_before_m: float, weight_before: int, fused_m: float, byte: int, rule: Rule
+    observed_m: float, fused_before_m: float, weight_before: int, fused_m: float, byte: int, rule: FusionRule
 ) -> int:
     """Return a voxel's byte after one observation: evidence and state moved, list bit kept."""
     agrees = weight_before == 0 or abs(observed_m - fused_before_m) <= rule.free_above_m
@@ -117,13 +117,13 @@ def enlist(voxels: Voxels, at: int, byte: int, count: int) -> int:
 
 
 @nb.njit(cache=True)
-def reciprocals(rule: Rule) -> Float:
+def reciprocals(rule: FusionRule) -> Float:
     """1 / (w + 1) of every weight w."""
     return 1.0 / np.arange(1, rule.max_weight + 2)
 
 
 @nb.njit(cache=True, inline="always")
-def observe(voxels: Voxels, at: int, observed: float, rule: Rule, reciprocal: Float, count: int) -> int:
+def observe(voxels: Voxels, at: int, observed: float, rule: FusionRule, reciprocal: Float, count: int) -> int:
     """Fuse and judge one observation of a voxel, m; returns the new count of changes."""
     before, had, byte = voxels.tsdf_m[at], np.int64(voxels.weight[at]), np.int64(voxels.live[at])
     if not keeps_free(observed, before, had, byte, rule):

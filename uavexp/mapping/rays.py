@@ -20,7 +20,7 @@ import numba as nb
 import numpy as np
 
 from uavexp.arrays import Float, Float32, Int32
-from uavexp.mapping.occupancy import OccupancyMap, Rule, Voxels, observe, reciprocals
+from uavexp.mapping.occupancy import FusionRule, OccupancyMap, Voxels, observe, reciprocals
 from uavexp.scan import RayScan
 
 _INSIDE = 1e-6  # voxels before the grid's border: rounding must not lead out of it
@@ -202,7 +202,9 @@ def _observe(
 
 
 @nb.njit(cache=True)
-def _fuse(voxels: Voxels, nearest: Float32, touched: Int32, voxel_m: float, rule: Rule, count: int) -> int:
+def _fuse(
+    voxels: Voxels, nearest: Float32, touched: Int32, voxel_m: float, rule: FusionRule, count: int
+) -> int:
     """Fuse the observations and clear them; returns how many voxels now stand in `changes`."""
     reciprocal = reciprocals(rule)
     for n in range(touched.shape[0]):
@@ -213,7 +215,7 @@ def _fuse(voxels: Voxels, nearest: Float32, touched: Int32, voxel_m: float, rule
     return count
 
 
-def integrate_rays(scan: RayScan, grid: OccupancyMap, rule: Rule) -> Int32:
+def integrate_rays(scan: RayScan, grid: OccupancyMap, rule: FusionRule) -> Int32:
     """Fuse one scan; return the voxels (N,) that it touched, flat, each once."""
     nearest, touched = grid.ray_arrays()
     count = _observe(

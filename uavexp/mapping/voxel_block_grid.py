@@ -32,8 +32,8 @@ from uavexp.errors import ConfigError
 from uavexp.field import DistanceField
 from uavexp.mapping.blocks import EDGE, Blocks, blocks_of, write_voxels
 from uavexp.mapping.frustum import column_depths, frustum_box
-from uavexp.mapping.occupancy import OccupancyMap, Rule, Voxels, enlist, judge, keeps_free
-from uavexp.mapping.parameters import MapParameters
+from uavexp.mapping.map_parameters import MapParameters
+from uavexp.mapping.occupancy import FusionRule, OccupancyMap, Voxels, enlist, judge, keeps_free
 from uavexp.mapping.rays import integrate_rays
 from uavexp.o3d import open3d
 from uavexp.parameters import Constraint, option
@@ -136,7 +136,7 @@ def _blocks_in_view(
 @nb.njit(cache=True)
 def _take_over(
     voxels: Voxels, blocks: Int32, rows: Int32, fused: Float32, weights: Float32, axis_step: Float,
-    axis_start: float, max_range_m: float, rule: Rule, count: int,
+    axis_start: float, max_range_m: float, rule: FusionRule, count: int,
 ) -> int:  # fmt: skip
     """Carry blocks that Open3D has just fused into the map, and what the rule says back into them.
 

@@ -26,7 +26,7 @@ from uavexp.inspection.viewpoints import Pattern
 from uavexp.inspection.visibility import Camera
 from uavexp.log import Inspection
 from uavexp.mission import unforeseen
-from uavexp.mission.coverage import Coverage, reachable_m, visible_anywhere
+from uavexp.mission.cells_seen import Coverage, reachable_m, visible_anywhere
 from uavexp.mission.tour_guide import Look, TourGuide
 from uavexp.parameters import Count, NonNegative, Positive, Range, Share, between, option
 from uavexp.scene import Scene

@@ -16,7 +16,7 @@ import numpy as np
 
 from uavexp import causes
 from uavexp.arrays import Float
-from uavexp.braking import braking_trajectory, with_stop
+from uavexp.braking import REST_MPS, braking_trajectory, with_stop
 from uavexp.log import Replan
 from uavexp.parameters import Count, NonNegative, option
 from uavexp.pilot.base import Crew
@@ -26,7 +26,6 @@ from uavexp.trajectory import Trajectory, derivative, evaluate, hover_before
 from uavexp.types import Decision, Goal, Observation, PlanRequest, PlanResult, PlanStatus, Reference
 
 _GOALS_FAULT = (PlanStatus.GOAL_BLOCKED, PlanStatus.NO_PATH, PlanStatus.NOT_CLEAR)  # another may do
-_REST_MPS = 0.05  # slower is standing
 _YAW_SHARE = 0.9  # of the body-rate limit: roll and pitch need theirs
 
 
@@ -207,7 +206,7 @@ class HoldingPilot:
         times_s = trajectory.start_s + np.array([0.0, self.rules.yaw_lookahead_s])
         position, velocity, _ = evaluate(trajectory, times_s)
         bearing = bearing_rad(self.best_goal, position[1] - position[0])
-        if float(np.linalg.norm(velocity[0])) > _REST_MPS or math.isnan(bearing):
+        if float(np.linalg.norm(velocity[0])) > REST_MPS or math.isnan(bearing):
             return 0.0
         return self.heading.turning_s(bearing, self.rules.turn_first_rad)
 

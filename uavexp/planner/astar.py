@@ -13,7 +13,7 @@ from dataclasses import field
 from uavexp.parameters import option
 from uavexp.planner.find.base import Finder
 from uavexp.planner.find.voxel import Voxel
-from uavexp.planner.find_and_shape import FindAndShape, Movers
+from uavexp.planner.find_and_shape import FindAndShape, MoversSeen
 from uavexp.planner.shape.base import Shaper
 from uavexp.planner.shape.scp import Scp
 
@@ -24,7 +24,7 @@ class Astar(FindAndShape):
 
     find: Finder = field(default_factory=Voxel)
     shape: Shaper = field(default_factory=Scp)
-    movers: Movers = Movers.CURRENT
+    movers: MoversSeen = MoversSeen.CURRENT
 
 
 if __name__ == "__main__":

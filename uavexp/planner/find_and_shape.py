@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from uavexp.braking import braking_trajectory
+from uavexp.braking import REST_MPS, braking_trajectory
 from uavexp.errors import require
 from uavexp.parameters import NonNegative, Positive, Unknown
 from uavexp.planner.constraints import Constraints
@@ -31,7 +31,6 @@ from uavexp.planner.movers.escape import safest_stop
 from uavexp.planner.movers.moving import MovingObstacles
 from uavexp.planner.movers.rungs import ALONE, Rung, met, rungs
 from uavexp.planner.shape.base import ShapedPath, Shaper
-from uavexp.planner.shape.start import REST_MPS
 from uavexp.planner.shape.stop_first import stop_first, summed
 from uavexp.trajectory import evaluate, sample_times
 from uavexp.types import Limits, PlanRequest, PlanResult, PlanStatus, Tracks
@@ -40,7 +39,7 @@ _MENDED_BY_BRAKING = (PlanStatus.NOT_CLEAR, PlanStatus.LIMITS, PlanStatus.SOLVER
 _CHECK_S = 0.02
 
 
-class Movers(StrEnum):
+class MoversSeen(StrEnum):
     """Where movers are obstacles."""
 
     PREDICTED = "predicted"  # where they will be met
@@ -60,8 +59,8 @@ class FindAndShape:
     # [ours]
     unknown: Unknown = Unknown.OPTIMISTIC  # optimistic: unknown space is free; conservative: it is not
     # entered
-    movers: Movers = Movers.PREDICTED  # predicted: obstacles where they will be met; current: where they
-    # are now, paper 2's traditional method [ours]
+    movers: MoversSeen = MoversSeen.PREDICTED  # predicted: obstacles where they will be met; current:
+    # where they are now, paper 2's traditional method [ours]
     mover_margin_m: NonNegative = 0.5  # m, beyond the body's circle, kept from movers: delta of paper 2;
     # trigger.margin_m of risk is the same [ours]
     mover_horizon_s: NonNegative = 2.0  # s, predictions count for so long; stopping from 2.5 m/s takes as
@@ -119,7 +118,7 @@ class FindAndShape:
     def _moving(self, request: PlanRequest, limits: Limits) -> MovingObstacles:
         """The believed movers with what is kept from them; none when they do not count at all."""
         tracks = request.tracks if self.mover_horizon_s > 0.0 else Tracks.none(request.time_s)
-        if self.movers is Movers.CURRENT:
+        if self.movers is MoversSeen.CURRENT:
             tracks = replace(tracks, velocity_mps=np.zeros_like(tracks.velocity_mps))
         return MovingObstacles(
             tracks=tracks,

@@ -23,7 +23,7 @@ SCENE = "scene"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Estimate:
+class ArmEstimate:
     """Mean of a metric over the trials of an arm."""
 
     n: int  # trials for which it exists
@@ -152,15 +152,15 @@ def arm_names(trials: pd.DataFrame, arm_axes: Sequence[str]) -> pd.Series:
     return names.str.removeprefix(", ")
 
 
-def estimate(panel: Panel, metric: Metric, arm: str) -> Estimate:
+def estimate(panel: Panel, metric: Metric, arm: str) -> ArmEstimate:
     """Mean of a metric over an arm's trials, with its spread and interval."""
     values = panel.values(metric, arm)
     exists = np.isfinite(values)
     values, scene = values[exists], panel.scene[exists]
     if not values.size:
-        return Estimate(n=0, mean=math.nan, sd=math.nan, interval=statistics.NOTHING)
+        return ArmEstimate(n=0, mean=math.nan, sd=math.nan, interval=statistics.NOTHING)
     spread = significance.cluster_means(values, scene) if metric.is_rate else values
-    return Estimate(
+    return ArmEstimate(
         n=values.size,
         mean=float(values.mean()),
         sd=float(spread.std(ddof=1)) if spread.size > 1 else math.nan,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from uavexp.metrics.metric import Metric
-from uavexp.report.comparison import Difference, Estimate
+from uavexp.report.comparison import ArmEstimate, Difference
 from uavexp.report.statistics import Interval
 
 NONE = "–"
@@ -30,12 +30,12 @@ def interval(ends: Interval, digits: int) -> str:
     return f"[{number(ends.low, digits)}, {number(ends.high, digits)}]" if math.isfinite(ends.low) else ""
 
 
-def mean_with_interval(found: Estimate, metric: Metric, n: int) -> str:
+def mean_with_interval(found: ArmEstimate, metric: Metric, n: int) -> str:
     """Mean and interval, and the trials it exists for where they are fewer than all n."""
     return _join(number(found.mean, metric.digits), interval(found.interval, metric.digits), _few(found, n))
 
 
-def mean_with_spread(found: Estimate, metric: Metric, n: int) -> str:
+def mean_with_spread(found: ArmEstimate, metric: Metric, n: int) -> str:
     """Mean ± standard deviation, interval, and the trials it exists for where fewer than all n."""
     spread = f" ± {number(found.sd, metric.digits)}" if math.isfinite(found.sd) else ""
     mean = number(found.mean, metric.digits) + spread
@@ -54,7 +54,7 @@ def p_value(p: float) -> str:
     return "<0.001" if p < 0.001 else f"{p:.3f}"
 
 
-def _few(found: Estimate, n: int) -> str:
+def _few(found: ArmEstimate, n: int) -> str:
     return f"(n = {found.n})" if 0 < found.n < n else ""
 
 

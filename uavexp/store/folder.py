@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import IO
 
-from uavexp.config.composition import Command
+from uavexp.config.composition import CommandLine
 from uavexp.errors import ConfigError, RecordError
 from uavexp.paths import outputs_root
 from uavexp.store.records import write_bytes
@@ -23,7 +23,7 @@ LOCK = ".lock"
 _PART = ".part"
 
 
-def folder_of(command: Command) -> Path:
+def folder_of(command: CommandLine) -> Path:
     """Folder of a command: as typed, the experiment's own, or a new numbered one.
 
     Raises:
@@ -43,7 +43,7 @@ def folder_of(command: Command) -> Path:
 
 
 @contextlib.contextmanager
-def opened(command: Command) -> Iterator[Path]:
+def opened(command: CommandLine) -> Iterator[Path]:
     """Make a command's folder and hold its lock; if no trial came of it, what was made is removed again.
 
     Raises:
@@ -65,7 +65,7 @@ def opened(command: Command) -> Iterator[Path]:
                 path.rmdir()  # only an empty one
 
 
-def _make(command: Command, made: list[Path]) -> Path:
+def _make(command: CommandLine, made: list[Path]) -> Path:
     """Make the folder of a command; a numbered one is new, also when another command takes its number.
 
     Args:
@@ -94,7 +94,7 @@ def _unwritable(folder: Path, error: OSError) -> ConfigError:
     return ConfigError(f"cannot write to the output folder {folder} ({error.strerror}); use out=DIR")
 
 
-def _prefix(command: Command) -> str:
+def _prefix(command: CommandLine) -> str:
     names = dict.fromkeys(cell.strategy for cell in command.cells)
     worlds = dict.fromkeys(cell.options["world"] for cell in command.cells)
     return "-".join([*names, *worlds])[:60]

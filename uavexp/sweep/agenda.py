@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from uavexp.config.composition import Command, Composer
+from uavexp.config.composition import CommandLine, Composer
 from uavexp.config.overrides import Setting
 from uavexp.flight import repeat_command
 from uavexp.store.outputs import identity
@@ -38,7 +38,7 @@ class Agenda:
 
 
 def agenda_of(
-    command: Command, folder: Path, user_folder: Path | None = None, *, accept_other_code: bool = False
+    command: CommandLine, folder: Path, user_folder: Path | None = None, *, accept_other_code: bool = False
 ) -> Agenda:
     """Compare a command with its folder; nothing is written.
 
@@ -61,7 +61,7 @@ def agenda_of(
     )
 
 
-def _joined(stored: Study, asked: Study, command: Command, user_folder: Path | None) -> Study:
+def _joined(stored: Study, asked: Study, command: CommandLine, user_folder: Path | None) -> Study:
     """The study of a folder after one more command: the larger of two, or two parts of one experiment.
 
     Parts are told by the command typed with the entries of both: it must have the cells of both.
@@ -76,7 +76,7 @@ def _joined(stored: Study, asked: Study, command: Command, user_folder: Path | N
     return join_studies(stored, asked, whole=_study(whole, stored.folder, cells))
 
 
-def _is_part(command: Command, stored: Study) -> bool:
+def _is_part(command: CommandLine, stored: Study) -> bool:
     """Whether a command's experiment is the stored one's and still has the entries that were flown."""
     experiment = command.experiment
     return (
@@ -86,7 +86,7 @@ def _is_part(command: Command, stored: Study) -> bool:
     )
 
 
-def _with_entries_of(stored: Study, command: Command, user_folder: Path | None) -> Command:
+def _with_entries_of(stored: Study, command: CommandLine, user_folder: Path | None) -> CommandLine:
     """The command as if the entries flown before had been picked, too."""
     axes = command.experiment.axes if command.experiment else {}
     picked = [
@@ -98,7 +98,7 @@ def _with_entries_of(stored: Study, command: Command, user_folder: Path | None) 
 
 
 def _jobs(
-    command: Command,
+    command: CommandLine,
     folder: Path,
     identities: list[dict[str, Any]],
     code: Mapping[str, Any],
@@ -123,7 +123,7 @@ def _jobs(
     )
 
 
-def _study(command: Command, folder: Path, identities: list[dict[str, Any]]) -> Study:
+def _study(command: CommandLine, folder: Path, identities: list[dict[str, Any]]) -> Study:
     experiment = command.experiment
     return Study(
         folder=folder,

@@ -22,7 +22,7 @@ from typing import Any
 from uavexp.errors import ConfigError, UavexpError
 from uavexp.store.records import Status
 from uavexp.sweep.faults import failure
-from uavexp.sweep.job import Answer, Call, Done, Job, Limits
+from uavexp.sweep.job import Allowance, Answer, Call, Done, Job
 from uavexp.sweep.local import run_local, start_fork_server
 
 _ALLOWED_FAILURES = 1  # workers that one job may take down beyond the first
@@ -37,7 +37,7 @@ def run_dask(
     address: str | None,
     queue: str | None,
     n_jobs: int,
-    limits: Limits,
+    limits: Allowance,
     preload: Sequence[str] = (),
     version: Callable[[], Any] | None = None,
 ) -> Generator[Done, None, None]:
@@ -139,7 +139,7 @@ def _killed(job: Job) -> Done:
     return Done(job=job, answer=answer, wall_s=0.0)
 
 
-def _run_on_worker(call: Call, job: Job, *, limits: Limits, preload: tuple[str, ...]) -> Done:
+def _run_on_worker(call: Call, job: Job, *, limits: Allowance, preload: tuple[str, ...]) -> Done:
     """Supervise one job on a worker."""
     # a worker under Dask's nanny is a daemon, to which multiprocessing denies children; these
     # cannot be left behind, they die with it (`child`)
@@ -148,7 +148,7 @@ def _run_on_worker(call: Call, job: Job, *, limits: Limits, preload: tuple[str, 
     return next(run_local(call, [job], n_jobs=1, limits=limits))
 
 
-def _cluster(distributed: Any, queue: str | None, n_jobs: int, limits: Limits) -> Any:
+def _cluster(distributed: Any, queue: str | None, n_jobs: int, limits: Allowance) -> Any:
     """A cluster for this sweep, to be closed with it."""
     _import("dask").config.set({"distributed.scheduler.allowed-failures": _ALLOWED_FAILURES})
     if queue is None:
@@ -164,7 +164,7 @@ def _cluster(distributed: Any, queue: str | None, n_jobs: int, limits: Limits) -
     return cluster
 
 
-def slurm_cluster(limits: Limits) -> Any:
+def slurm_cluster(limits: Allowance) -> Any:
     """SLURM jobs of one worker each; partition, account and time come from Dask's `jobqueue.yaml`."""
     memory_mb = int(limits.memory_mb) + _WORKER_MB
     return _import("dask_jobqueue").SLURMCluster(cores=1, processes=1, memory=f"{memory_mb}MB")

@@ -23,7 +23,7 @@ class Job:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Limits:
+class Allowance:
     """What one job may take."""
 
     timeout_s: float

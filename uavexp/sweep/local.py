@@ -28,7 +28,7 @@ from typing import IO
 from uavexp.store.records import Status
 from uavexp.sweep.child import run_child
 from uavexp.sweep.faults import death
-from uavexp.sweep.job import Answer, Call, Done, Job, Limits
+from uavexp.sweep.job import Allowance, Answer, Call, Done, Job
 
 Watch = Callable[[Job, float, str], None]  # job, simulated time s, a few words
 
@@ -52,7 +52,7 @@ def run_local(
     jobs: Iterable[Job],
     *,
     n_jobs: int,
-    limits: Limits,
+    limits: Allowance,
     watch: Watch | None = None,
 ) -> Generator[Done, None, None]:
     """Run jobs, so many at a time, and yield each when it has ended.
@@ -87,7 +87,7 @@ class _Supervisor:
     """Runs jobs in children, from several threads at once."""
 
     call: Call
-    limits: Limits
+    limits: Allowance
     watch: Watch | None
     # multiprocessing's bookkeeping of children is not made for threads: two that poll one child
     # at the same time may both take its exit code, and one gets a wrong one

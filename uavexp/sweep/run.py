@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from uavexp.config.composition import Command
+from uavexp.config.composition import CommandLine
 from uavexp.errors import ConfigError, RecordError, UavexpError, one_line
 from uavexp.flight import check_world, fly_cell
 from uavexp.store.folder import folder_of, opened, put_trial, put_world, remove_unfinished, set_aside
@@ -32,7 +32,7 @@ _WARM_UP_S = 3.0  # simulated: by then every kernel of a flight has been called
 
 
 def execute(
-    command: Command, audience: Audience, user_folder: Path | None = None, typed: Sequence[str] = ()
+    command: CommandLine, audience: Audience, user_folder: Path | None = None, typed: Sequence[str] = ()
 ) -> int:
     """Fly a command's trials and leave their folder.
 
@@ -70,7 +70,7 @@ def _prepare(agenda: Agenda, runner: Runner, audience: Audience) -> None:
         start_fork_server([PRELOAD])
 
 
-def _fly_agenda(agenda: Agenda, command: Command, audience: Audience, run: Run, runner: Runner) -> int:
+def _fly_agenda(agenda: Agenda, command: CommandLine, audience: Audience, run: Run, runner: Runner) -> int:
     folder, kept, failed = agenda.study.folder, 0, 0
     with (
         audience.progress(agenda),

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from uavexp.errors import require
 from uavexp.parameters import Constraint, Positive, check_value, option, parameter_types
-from uavexp.sweep.job import Limits
+from uavexp.sweep.job import Allowance
 
 
 class Backend(StrEnum):
@@ -59,9 +59,9 @@ class Runner:
         return self.n_jobs if self.n_jobs > 0 else cores()
 
     @property
-    def limits(self) -> Limits:
+    def limits(self) -> Allowance:
         """What one trial may take."""
-        return Limits(timeout_s=self.timeout_s, memory_mb=self.memory_mb)
+        return Allowance(timeout_s=self.timeout_s, memory_mb=self.memory_mb)
 
     @property
     def how(self) -> dict[str, Any]:

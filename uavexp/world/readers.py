@@ -29,7 +29,7 @@ MAPS = (".yaml", ".yml")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Voxels:
+class VoxelFile:
     """Voxel centres in the file's own frame and unit."""
 
     occupied: Float  # (N, 3)
@@ -196,7 +196,7 @@ def _pcd_points(path: Path) -> int:
     return promised
 
 
-def read_voxels(path: Path) -> Voxels:
+def read_voxels(path: Path) -> VoxelFile:
     """Return the voxels of an npz file.
 
     Keys: `centres` and `resolution`; or `occupied`, `free` and `resolution` (centres); or
@@ -230,7 +230,7 @@ def read_voxels(path: Path) -> Voxels:
             raise WorldError(f"world file {path} has {name} voxels that are NaN or infinite")
     if occupied.shape[0] == 0:
         raise WorldError(f"world file {path} holds no occupied voxels")
-    return Voxels(occupied=occupied, free=free, resolution=size)
+    return VoxelFile(occupied=occupied, free=free, resolution=size)
 
 
 @contextmanager

@@ -19,7 +19,7 @@ import numpy as np
 
 from uavexp.arrays import Bool, Float, Int, Int32, UInt8
 from uavexp.triangle_grid import TriangleGrid, ball_meets_mesh, box_meets_mesh
-from uavexp.world.sight import in_sight
+from uavexp.world.line_of_sight import in_sight
 
 _UNTESTED, _BLOCKED, _PASSABLE, _PASSABLE_END = 0, 1, 2, 3
 

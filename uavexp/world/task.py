@@ -17,6 +17,7 @@ from uavexp.arrays import Float, Float32, Int32
 from uavexp.geometry import polyline_length_m
 from uavexp.scene import Scene
 from uavexp.types import Difficulty, World
+from uavexp.world.line_of_sight import skip_ahead, tighten
 from uavexp.world.shortest import (
     empty_columns,
     make_nodes,
@@ -24,7 +25,6 @@ from uavexp.world.shortest import (
     proof_radius_m,
     shortest_lattice_path,
 )
-from uavexp.world.sight import skip_ahead, tighten
 
 CELL_M = 0.1  # spacing of the lattice on which the shortest path is exact
 FINE_CELL_M = 0.05  # tried where that one is too coarse for a building's passages

@@ -11,11 +11,11 @@ import pytest
 
 from uavexp.arrays import Float
 from uavexp.cloud.__main__ import main
+from uavexp.cloud.cloud_file import CloudError, read_cloud
 from uavexp.cloud.outliers import outliers
 from uavexp.cloud.pipeline import CloudPipeline
 from uavexp.cloud.planes import fit_planes, plane_of
-from uavexp.cloud.points import CloudError, read_cloud
-from uavexp.cloud.scan import simulated_scan
+from uavexp.cloud.simulated_scan import simulated_scan
 from uavexp.cloud.traversability import obstacles
 from uavexp.cloud.voxels import packed, unpacked, voxelise
 from uavexp.errors import ConfigError

@@ -12,7 +12,7 @@ from uavexp.arrays import Float
 from uavexp.bodies import ABSENT_M
 from uavexp.check.fields import empty, field_from
 from uavexp.detection.clusters import Clusters
-from uavexp.detection.kalman import Estimate, Motion, MotionFilter, estimated
+from uavexp.detection.kalman import Estimate, MotionFilter, MotionModel, estimated
 from uavexp.detection.tracker import Tracker, TrackRule, centres_m
 from uavexp.log import Contact, TrialLog
 from uavexp.metrics.metric import Flight, measured
@@ -25,7 +25,7 @@ def still(times_s: Float) -> Float:
     return np.zeros((len(times_s), 3))
 
 
-RULE = TrackRule(4.0, 3, 0.25, 0.12, 1.0, 1.2, 6.0, 2.0, Motion())
+RULE = TrackRule(4.0, 3, 0.25, 0.12, 1.0, 1.2, 6.0, 2.0, MotionModel())
 SENSOR_M = np.zeros(3)
 TIMES_S = np.arange(40) * 0.1
 
@@ -42,7 +42,7 @@ def test_a_straight_walk_without_noise_is_followed_exactly_in_the_end() -> None:
 
 def test_the_first_update_is_that_of_the_textbook() -> None:
     """K = P H' (H P H' + R)^-1 of one axis, by hand."""
-    motion, period, moved = Motion(), 0.1, 0.07
+    motion, period, moved = MotionModel(), 0.1, 0.07
     filter_ = MotionFilter(np.zeros(3), motion)
     filter_.predict(period)
     filter_.observe(np.array([moved, 0.0, 0.0]))
@@ -72,10 +72,10 @@ def test_process_noise_rises_in_a_turn_and_falls_again() -> None:
     seen = np.cumsum(corner * 0.1, axis=0)
     lag = {}
     for adaptivity in (1.0, 20.0):
-        _, velocity = estimated(TIMES_S, seen, Motion(acceleration_density=0.05, adaptivity=adaptivity))
+        _, velocity = estimated(TIMES_S, seen, MotionModel(acceleration_density=0.05, adaptivity=adaptivity))
         lag[adaptivity] = np.linalg.norm(velocity[25] - [-1.5, 0.0, 0.0])
     assert lag[20.0] < 0.85 * lag[1.0]
-    filter_, misfit = MotionFilter(seen[0], Motion()), []
+    filter_, misfit = MotionFilter(seen[0], MotionModel()), []
     for position_m in seen[1:]:
         filter_.predict(0.1)
         filter_.observe(position_m)
@@ -87,7 +87,7 @@ def test_process_noise_rises_in_a_turn_and_falls_again() -> None:
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_what_is_not_finite_is_no_observation(bad: float) -> None:
     """filterpy's update(NaN) poisons the state without a word."""
-    filter_ = MotionFilter(np.zeros(3), Motion())
+    filter_ = MotionFilter(np.zeros(3), MotionModel())
     filter_.predict(0.1)
     before = filter_.position_m.copy(), filter_.covariance.copy()
     filter_.observe(np.array([0.1, bad, 0.0]))

@@ -16,7 +16,7 @@ from uavexp.inspection.visibility import Camera
 from uavexp.log import TrialLog
 from uavexp.metrics import coverage as figures
 from uavexp.metrics.metric import Flight, measured
-from uavexp.mission.coverage import Coverage, is_met, reachable_m, visible_anywhere
+from uavexp.mission.cells_seen import Coverage, is_met, reachable_m, visible_anywhere
 from uavexp.scene import Scene
 from uavexp.types import Bodies, Outcome, Shape, World
 

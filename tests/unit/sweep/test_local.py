@@ -17,17 +17,17 @@ from tests.jobs import act
 from uavexp.errors import ConfigError
 from uavexp.paths import PACKAGE
 from uavexp.store.records import Status
-from uavexp.sweep.job import Done, Job, Limits
+from uavexp.sweep.job import Allowance, Done, Job
 from uavexp.sweep.local import run_local, start_fork_server
 
-LIMITS = Limits(timeout_s=60.0, memory_mb=1000.0)
+LIMITS = Allowance(timeout_s=60.0, memory_mb=1000.0)
 
 
 def jobs(*payloads: tuple[str, Any]) -> list[Job]:
     return [Job(name=str(number), label=deed, payload=(deed, x)) for number, (deed, x) in enumerate(payloads)]
 
 
-def run(given: Sequence[Job], n_jobs: int = 2, limits: Limits = LIMITS) -> dict[str, Done]:
+def run(given: Sequence[Job], n_jobs: int = 2, limits: Allowance = LIMITS) -> dict[str, Done]:
     start_fork_server(["tests.jobs"])
     results = list(run_local(act, given, n_jobs=n_jobs, limits=limits))
     assert sorted(done.job.name for done in results) == sorted(job.name for job in given), (
@@ -75,7 +75,7 @@ def test_a_trace_names_the_place_and_no_path_of_this_machine(ended: dict[str, Do
 @pytest.mark.parametrize("deed", ["sleep", "spin"])
 def test_a_job_that_hangs_is_ended_at_its_limit(deed: str) -> None:
     begin_s = time.monotonic()
-    done = run(jobs((deed, 60.0)), limits=Limits(timeout_s=1.0, memory_mb=1000.0))[deed]
+    done = run(jobs((deed, 60.0)), limits=Allowance(timeout_s=1.0, memory_mb=1000.0))[deed]
     assert done.answer.status is Status.HUNG
     assert done.answer.reason == "not done after 1 s"
     assert 1.0 <= done.wall_s < 10.0
@@ -164,7 +164,7 @@ def test_an_interrupt_finds_no_child_half_begun(n_jobs: int) -> None:
 @pytest.mark.parametrize("values", [{"timeout_s": 0.0}, {"memory_mb": -1.0}, {"timeout_s": float("inf")}])
 def test_limits_must_be_positive_and_finite(values: dict[str, float]) -> None:
     with pytest.raises(ConfigError, match="must be > 0 and finite"):
-        Limits(**{"timeout_s": 1.0, "memory_mb": 1.0, **values})
+        Allowance(**{"timeout_s": 1.0, "memory_mb": 1.0, **values})
 
 
 def noted(folder: Path) -> set[int]:

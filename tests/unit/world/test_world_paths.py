@@ -11,8 +11,8 @@ from uavexp.geometry import polyline_length_m
 from uavexp.scene import Scene
 from uavexp.world import task
 from uavexp.world.boxes import Boxes
+from uavexp.world.line_of_sight import in_sight
 from uavexp.world.shortest import make_nodes, shortest_lattice_path
-from uavexp.world.sight import in_sight
 
 BOUNDS = np.array([[0.0, 0.0, 0.0], [4.0, 3.0, 1.2]])
 

@@ -31,7 +31,16 @@ from uavexp.parameters import Count, NonNegative, option
 from uavexp.planner.constraints import Constraints
 from uavexp.planner.find.base import FoundPath
 from uavexp.planner.find.ends import refusal
-from uavexp.planner.find.grid_search import BUDGET, FOUND, STEPS, Nodes, Rule, Space, plan_cells, plan_columns
+from uavexp.planner.find.grid_search import (
+    BUDGET,
+    FOUND,
+    STEPS,
+    ClearanceRule,
+    Nodes,
+    Space,
+    plan_cells,
+    plan_columns,
+)
 from uavexp.types import PlanRequest, PlanStatus
 
 _RESERVE_VOXELS = 0.25  # clearance of cells above the limit: for diagonal steps, and the curve's freedom
@@ -105,7 +114,7 @@ class Grid:
         here_m = min(float(map_.distance_m(start_m[None])[0]), float(map_.distance[tuple(start)]))
         least_m = constraints.min_clearance_m + _RESERVE_VOXELS * map_.voxel_size_m
         spread, missing = constraints.safe_clearance_m - least_m, max(least_m - here_m, 0.0)
-        rule = Rule(
+        rule = ClearanceRule(
             least_m,
             constraints.safe_clearance_m,
             1.0 / spread if spread > 0.0 else 0.0,

@@ -32,7 +32,7 @@ def _octile(di: int, dj: int, dk: int) -> float:
     return float(octile(di, dj, dk, 0.41421356237309503, 0.3178372451957822))
 
 
-class Rule(NamedTuple):
+class ClearanceRule(NamedTuple):
     """What a clearance is worth."""
 
     least_m: float  # cells below it are closed
@@ -50,7 +50,7 @@ class Space(NamedTuple):
     state: UInt8  # (X, Y, Z)
     known_only: bool
     cut_corners: bool
-    rule: Rule
+    rule: ClearanceRule
     box: Int  # (2, 3) first and last voxel
     start: Int  # (3,) voxel
     goal: Int  # (3,) voxel
@@ -67,7 +67,7 @@ class Nodes(NamedTuple):
 
 
 @nb.njit(cache=True, inline="always")
-def _penalty(clearance: float, rule: Rule) -> float:
+def _penalty(clearance: float, rule: ClearanceRule) -> float:
     """Share by which a cell of this clearance lengthens the way through it."""
     if clearance >= rule.safe_m:
         return 0.0
@@ -77,7 +77,7 @@ def _penalty(clearance: float, rule: Rule) -> float:
 
 
 @nb.njit(cache=True, inline="always")
-def _limit(rule: Rule, distance_voxels_squared: float) -> float:
+def _limit(rule: ClearanceRule, distance_voxels_squared: float) -> float:
     """Least clearance of a passable cell at this squared distance from the start."""
     return float(min(rule.least_m, rule.start_m) if distance_voxels_squared <= rule.reach2 else rule.least_m)
 

@@ -27,7 +27,7 @@ class Query(NamedTuple):
     iterations: int
 
 
-class Answer(NamedTuple):
+class Solved(NamedTuple):
     """What it found."""
 
     path: Float  # (P, 3) from start to goal; empty: nothing
@@ -37,7 +37,7 @@ class Answer(NamedTuple):
     cpu_s: float  # of the search alone
 
 
-def solve(query: Query) -> Answer:
+def solve(query: Query) -> Solved:
     """Run a search in this process, which must not have used OMPL's random numbers before."""
     import ompl.base as ob
     import ompl.util as ou
@@ -70,7 +70,7 @@ def solve(query: Query) -> Answer:
     if problem.hasExactSolution():
         path = np.array([map_.place(state) for state in problem.getSolutionPath().getStates()])
         path[0], path[-1] = query.space.ends_m
-    return Answer(path, np.array(history).reshape(-1, 4), planner.numIterations(), map_.checks, cpu_s)
+    return Solved(path, np.array(history).reshape(-1, 4), planner.numIterations(), map_.checks, cpu_s)
 
 
 class _Map:

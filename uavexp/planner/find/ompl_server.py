@@ -25,12 +25,12 @@ from uavexp.errors import ConfigError
 from uavexp.field import DistanceField
 from uavexp.planner.find.batch_tree.informed import sampled_region
 from uavexp.planner.find.free_space import free_space, look, straight_is_free
-from uavexp.planner.find.ompl_search import Answer, Query, solve
+from uavexp.planner.find.ompl_search import Query, Solved, solve
 
 _LENGTH_BYTES = 8
 
 
-def search_with_ompl(query: Query) -> Answer:
+def search_with_ompl(query: Query) -> Solved:
     """Run one search and wait for its answer.
 
     Raises:
@@ -45,7 +45,7 @@ def search_with_ompl(query: Query) -> Answer:
         return search_with_ompl(query)
     _write(server.stdin, query)
     answer = _read(server.stdout)
-    if not isinstance(answer, Answer):
+    if not isinstance(answer, Solved):
         raise RuntimeError(f"OMPL's {query.planner} failed: {answer}")
     return answer
 
@@ -84,7 +84,7 @@ def _read(pipe: IO[bytes]) -> object:
 
 
 def serve() -> None:
-    """Answer the queries of standard input, one at a time, until it ends."""
+    """Solved the queries of standard input, one at a time, until it ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the terminal's Ctrl-C is the parent's to handle
     queries, answers = os.fdopen(0, "rb"), os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what OMPL prints is no answer

@@ -33,15 +33,15 @@ from typing import Annotated
 import numpy as np
 
 from uavexp.arrays import Float
+from uavexp.braking import REST_MPS
 from uavexp.parameters import Count, NonNegative, Positive, Whole, at_least, below, option
 from uavexp.planner.constraints import Constraints
 from uavexp.planner.find.base import FoundPath
 from uavexp.planner.find.batch_tree.batch import Budget, Found, search
 from uavexp.planner.find.batch_tree.cubic_motion import cubic_coefficients
-from uavexp.planner.find.batch_tree.edges import Rule
+from uavexp.planner.find.batch_tree.edges import EdgeRule
 from uavexp.planner.find.ends import refusal
 from uavexp.planner.find.free_space import FreeSpace, for_motions, space_of, straight_is_free
-from uavexp.planner.shape.start import REST_MPS
 from uavexp.planner.shape.timing import STEP_M, resample, smooth, time_profile
 from uavexp.trajectory import Trajectory
 from uavexp.types import Limits, PlanRequest, PlanStatus
@@ -128,8 +128,10 @@ class Tree:
         path, times = _sampled(found)
         return replace(_answer(spent, path, ""), times_s=times, motion=_motion(found, time_s))
 
-    def _rule(self, limits: Limits, corner_mps: float) -> Rule:
-        return Rule(False, corner_mps, self.max_edge_m, limits.max_speed_mps, limits.max_acceleration_mps2)
+    def _rule(self, limits: Limits, corner_mps: float) -> EdgeRule:
+        return EdgeRule(
+            False, corner_mps, self.max_edge_m, limits.max_speed_mps, limits.max_acceleration_mps2
+        )
 
     def _budget(self, batches: int) -> Budget:
         return Budget(

@@ -10,12 +10,12 @@ from typing import NamedTuple
 import numpy as np
 
 from uavexp.arrays import Float
-from uavexp.braking import braking_trajectory
+from uavexp.braking import REST_MPS, braking_trajectory
 from uavexp.planner.constraints import Constraints
 from uavexp.planner.find.base import Finder
 from uavexp.planner.movers.moving import MovingObstacles
 from uavexp.planner.shape.excess import instants
-from uavexp.planner.shape.start import REST_MPS, refusal, state_of
+from uavexp.planner.shape.start import refusal, state_of
 from uavexp.planner.shape.static_spline import StaticSpline
 from uavexp.planner.shape.stop_first import stop_first
 from uavexp.trajectory import Trajectory, evaluate

@@ -28,6 +28,7 @@ from typing import Annotated, ClassVar, NamedTuple
 import numpy as np
 
 from uavexp.arrays import Float
+from uavexp.braking import REST_MPS
 from uavexp.parameters import NonNegative, Positive, between, option
 from uavexp.planner.constraints import Constraints
 from uavexp.planner.find.base import FoundPath
@@ -38,7 +39,7 @@ from uavexp.planner.shape.cone_program import NO_CUTS, Problem, solve
 from uavexp.planner.shape.course import Given, at_shares, course, space_of
 from uavexp.planner.shape.excess import unavoidable
 from uavexp.planner.shape.flight_corridor import make_corridor
-from uavexp.planner.shape.start import REST_MPS, SHORTEST_S, TANGENT_M, end_velocity, refusal, state_of
+from uavexp.planner.shape.start import SHORTEST_S, TANGENT_M, end_velocity, refusal, state_of
 from uavexp.planner.shape.stop_first import braking, standing
 from uavexp.planner.shape.timing import STEP_M, resample
 from uavexp.planner.spline.clamped import Basis, make_basis, to_trajectory

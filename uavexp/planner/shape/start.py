@@ -12,7 +12,6 @@ from uavexp.braking import stopping_distance_m
 from uavexp.planner.shape.timing import STEP_M
 from uavexp.types import Limits, PlanRequest
 
-REST_MPS = 0.05  # a slower start counts as standing
 TANGENT_M = 1.0  # length over which the first and last direction of a path is taken
 SHORTEST_S = 0.2  # of a curve to where the vehicle is: h² of a shorter one drowns in rounding
 _EXCESS = 1.1  # a start beyond a limit by more than this factor is refused

@@ -17,9 +17,10 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from uavexp.arrays import Float
+from uavexp.braking import REST_MPS
 from uavexp.planner.constraints import Constraints
 from uavexp.planner.shape.base import ShapedPath
-from uavexp.planner.shape.start import REST_MPS, SHORTEST_S, on_path, refusal, state_of
+from uavexp.planner.shape.start import SHORTEST_S, on_path, refusal, state_of
 from uavexp.planner.shape.timing import STEP_M, resample, smooth, time_profile
 from uavexp.trajectory import Trajectory
 from uavexp.types import Limits, PlanRequest, PlanStatus

@@ -21,7 +21,7 @@ import numba as nb
 import numpy as np
 
 from uavexp.arrays import Float, Int
-from uavexp.planner.find.batch_tree.edges import Rule, bound, corners_fit, cost, fits
+from uavexp.planner.find.batch_tree.edges import EdgeRule, bound, corners_fit, cost, fits
 from uavexp.planner.find.batch_tree.informed import Region, draw, draw_near, sampled_region
 from uavexp.planner.find.batch_tree.neighbours import (
     Neighbours,
@@ -33,7 +33,7 @@ from uavexp.planner.find.batch_tree.tree_rows import (
     GOAL,
     NONE,
     START,
-    Tree,
+    TreeRows,
     add,
     attach,
     detach,
@@ -80,7 +80,7 @@ def search(
     goal: Float,
     seeds: Float,
     reach_m: float,
-    rule: Rule,
+    rule: EdgeRule,
     budget: Budget,
     rng: np.random.Generator,
 ) -> Found:
@@ -138,13 +138,13 @@ def search(
 
 @nb.njit(cache=True)
 def _add_batch(
-    tree: Tree,
+    tree: TreeRows,
     count: int,
     serial: int,
     batch: int,
     space: FreeSpace,
     region: Region,
-    rule: Rule,
+    rule: EdgeRule,
     budget: Budget,
     rng: np.random.Generator,
 ) -> tuple[int, int, int, int]:
@@ -178,12 +178,12 @@ def _add_batch(
 
 @nb.njit(cache=True)
 def _search_batch(
-    tree: Tree,
+    tree: TreeRows,
     count: int,
     batch: int,
     cells: Neighbours,
     space: FreeSpace,
-    rule: Rule,
+    rule: EdgeRule,
     failed: Int,
     iterations: int,
     most: int,
@@ -226,12 +226,12 @@ def _search_batch(
 
 @nb.njit(cache=True)
 def _expand(
-    tree: Tree,
+    tree: TreeRows,
     tail: int,
     batch: int,
     cells: Neighbours,
     near: Int,
-    rule: Rule,
+    rule: EdgeRule,
     queue: list[tuple[float, int, int, float]],
 ) -> None:
     """Put the edges from a vertex that may better a solution into the heap."""
@@ -257,7 +257,7 @@ def _expand(
 
 @nb.njit(cache=True)
 def _connect(
-    tree: Tree, tail: int, head: int, step: float, queue: list[tuple[float, int, int, float]]
+    tree: TreeRows, tail: int, head: int, step: float, queue: list[tuple[float, int, int, float]]
 ) -> None:
     """Make `tail` the parent of `head`, pass the gain on to its descendants, and expand them all again."""
     detach(tree, head)
@@ -274,16 +274,16 @@ def _connect(
 
 
 @nb.njit(cache=True)
-def _name(tree: Tree, tail: int, head: int) -> int:
+def _name(tree: TreeRows, tail: int, head: int) -> int:
     return int((tree.serial[tail] << 32) | tree.serial[head]) + 1
 
 
 @nb.njit(cache=True)
-def _slot(tree: Tree, tail: int, head: int) -> int:
+def _slot(tree: TreeRows, tail: int, head: int) -> int:
     """Where a blocked edge is remembered; a later one of the same slot replaces it."""
     return int(((tree.serial[tail] * 40503) ^ (tree.serial[head] * 30011)) & (_FAILURES - 1))
 
 
 @nb.njit(cache=True)
-def _is_failed(tree: Tree, tail: int, head: int, failed: Int) -> bool:
+def _is_failed(tree: TreeRows, tail: int, head: int, failed: Int) -> bool:
     return bool(failed[_slot(tree, tail, head)] == _name(tree, tail, head))

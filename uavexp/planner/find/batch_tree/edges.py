@@ -14,10 +14,10 @@ import numpy as np
 
 from uavexp.arrays import Float
 from uavexp.planner.find.batch_tree.cubic_motion import cubic_time, least_time
-from uavexp.planner.find.batch_tree.tree_rows import NONE, Tree
+from uavexp.planner.find.batch_tree.tree_rows import NONE, TreeRows
 
 
-class Rule(NamedTuple):
+class EdgeRule(NamedTuple):
     """What an edge is."""
 
     kinodynamic: bool
@@ -28,7 +28,7 @@ class Rule(NamedTuple):
 
 
 @nb.njit(cache=True)
-def bound(rule: Rule, a: Float, b: Float) -> float:
+def bound(rule: EdgeRule, a: Float, b: Float) -> float:
     """Lower bound on the cost of getting from one state to another."""
     if rule.kinodynamic:
         return float(least_time(a, b, rule.top_mps, rule.strongest_mps2))
@@ -36,7 +36,7 @@ def bound(rule: Rule, a: Float, b: Float) -> float:
 
 
 @nb.njit(cache=True)
-def cost(rule: Rule, a: Float, b: Float) -> float:
+def cost(rule: EdgeRule, a: Float, b: Float) -> float:
     """Cost of an edge on an empty map: its least time, inf if no motion keeps the limits; or its length."""
     if not rule.kinodynamic:
         return float(bound(rule, a, b))
@@ -44,7 +44,7 @@ def cost(rule: Rule, a: Float, b: Float) -> float:
 
 
 @nb.njit(cache=True)
-def fits(tree: Tree, tail: int, head: int, rule: Rule) -> bool:
+def fits(tree: TreeRows, tail: int, head: int, rule: EdgeRule) -> bool:
     """Whether the corner at `tail`, between the edge to it and the one to `head`, can be rounded."""
     before = tree.parent[tail]
     if rule.kinodynamic or rule.corner_mps == 0.0 or before == NONE:
@@ -60,7 +60,7 @@ def fits(tree: Tree, tail: int, head: int, rule: Rule) -> bool:
 
 
 @nb.njit(cache=True)
-def corners_fit(tree: Tree, tail: int, head: int, rule: Rule) -> bool:
+def corners_fit(tree: TreeRows, tail: int, head: int, rule: EdgeRule) -> bool:
     """Whether the new edge's corners fit as the tree is now: at `tail`, and at `head` into its children."""
     if rule.kinodynamic or rule.corner_mps == 0.0:
         return True

@@ -13,7 +13,7 @@ START, GOAL = 0, 1  # rows of the two ends
 NONE = -1
 
 
-class Tree(NamedTuple):
+class TreeRows(NamedTuple):
     """Samples and vertices; row 0 is the start, row 1 the goal."""
 
     state: Float  # (N, 6)
@@ -31,12 +31,12 @@ class Tree(NamedTuple):
 
 
 @nb.njit(cache=True)
-def new_tree(size: int) -> Tree:
+def new_tree(size: int) -> TreeRows:
     """Room for so many rows."""
     links = np.full((5, size), NONE, dtype=np.int32)
     numbers = np.full((5, size), np.inf)
     serial = np.zeros(size, dtype=np.int64)
-    return Tree(
+    return TreeRows(
         np.empty((size, 6)),
         numbers[0],
         numbers[1],
@@ -54,7 +54,7 @@ def new_tree(size: int) -> Tree:
 
 @nb.njit(cache=True)
 def add(
-    tree: Tree, row: int, state: Float, serial: int, batch: int, from_start: float, to_goal: float
+    tree: TreeRows, row: int, state: Float, serial: int, batch: int, from_start: float, to_goal: float
 ) -> None:
     """Write a new sample into a row."""
     tree.state[row] = state
@@ -64,21 +64,21 @@ def add(
 
 
 @nb.njit(cache=True)
-def _cut(tree: Tree, row: int) -> None:
+def _cut(tree: TreeRows, row: int) -> None:
     """Make a row a sample that is not in the tree."""
     tree.cost[row], tree.step[row], tree.expanded_cost[row] = np.inf, 0.0, np.inf
     tree.expanded_batch[row] = tree.parent[row] = tree.child[row] = tree.sibling[row] = NONE
 
 
 @nb.njit(cache=True)
-def attach(tree: Tree, tail: int, head: int, step: float) -> None:
+def attach(tree: TreeRows, tail: int, head: int, step: float) -> None:
     """Make `tail` the parent of `head`, which has none; costs are the caller's to set."""
     tree.parent[head], tree.step[head] = tail, step
     tree.sibling[head], tree.child[tail] = tree.child[tail], head
 
 
 @nb.njit(cache=True)
-def detach(tree: Tree, row: int) -> None:
+def detach(tree: TreeRows, row: int) -> None:
     """Take a row from its parent, if it has one."""
     parent = tree.parent[row]
     if parent == NONE:
@@ -94,7 +94,7 @@ def detach(tree: Tree, row: int) -> None:
 
 
 @nb.njit(cache=True)
-def prune(tree: Tree, count: int) -> int:
+def prune(tree: TreeRows, count: int) -> int:
     """Drop what cannot better the best solution; returns how many rows are left, in their order.
 
     A vertex stays in the tree with its parent, while cost + to_goal is no more than the best cost.
@@ -131,7 +131,7 @@ def prune(tree: Tree, count: int) -> int:
 
 
 @nb.njit(cache=True)
-def _still_in_tree(tree: Tree, count: int, best: float) -> Bool:
+def _still_in_tree(tree: TreeRows, count: int, best: float) -> Bool:
     """Which rows stay vertices."""
     stays = np.zeros(count, dtype=np.bool_)
     limit = best * (1.0 + 1e-12)  # the solution's own vertices reach it, up to rounding
@@ -148,7 +148,7 @@ def _still_in_tree(tree: Tree, count: int, best: float) -> Bool:
 
 
 @nb.njit(cache=True)
-def path_to(tree: Tree, row: int) -> tuple[Float, Float]:
+def path_to(tree: TreeRows, row: int) -> tuple[Float, Float]:
     """States (P, 6) from the start to a vertex and the costs (P - 1,) of the edges; empty for a sample."""
     if not np.isfinite(tree.cost[row]):
         return np.empty((0, 6)), np.empty(0)
@@ -166,7 +166,7 @@ def path_to(tree: Tree, row: int) -> tuple[Float, Float]:
 
 
 @nb.njit(cache=True)
-def edges_of(tree: Tree, count: int) -> Float:
+def edges_of(tree: TreeRows, count: int) -> Float:
     """Ends (E, 2, 3) of all edges of the tree, m."""
     out = np.empty((count, 2, 3))
     rows = 0

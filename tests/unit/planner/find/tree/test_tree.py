@@ -20,7 +20,7 @@ from uavexp.planner.find.batch_tree.cubic_motion import (
     least_time,
     scalar_time,
 )
-from uavexp.planner.find.batch_tree.edges import Rule
+from uavexp.planner.find.batch_tree.edges import EdgeRule
 from uavexp.planner.find.batch_tree.neighbours import neighbours_within, sort_into_cells
 from uavexp.planner.find.free_space import FreeSpace, free_space, straight_is_free
 from uavexp.planner.find.tree import Edges, Tree
@@ -38,14 +38,14 @@ GRID = empty((10.0, 8.0, 2.4))
 box(GRID, (3.0, 0.0, 0.0), (3.2, 5.0, 2.4))
 box(GRID, (6.0, 3.0, 0.0), (6.2, 8.0, 2.4))
 FIELD = field_from(GRID)
-STRAIGHT = Rule(False, 0.0, 6.0, 5.0, 3.5)
+STRAIGHT = EdgeRule(False, 0.0, 6.0, 5.0, 3.5)
 
 
 def walled() -> FreeSpace:
     return free_space(FIELD, np.stack([START, GOAL]), bounds(GRID), 0.26, 0.3, False)
 
 
-def grow(rule: Rule = STRAIGHT, seed: int = 0, **changes: Any) -> Found:
+def grow(rule: EdgeRule = STRAIGHT, seed: int = 0, **changes: Any) -> Found:
     numbers = {"first_batches": 20, "batches": 10, "batch_samples": 100, "iterations": 10**6}
     shares = {"local_share": 0.0, "local_spread_m": 0.3, "rewire_factor": 1.1}
     ends = [np.concatenate([point, np.zeros(3)]) for point in (START, GOAL)]

@@ -8,7 +8,7 @@ from typing import Annotated
 from uavexp.arrays import Float
 from uavexp.errors import require
 from uavexp.mapping.esdf import distance_table
-from uavexp.mapping.occupancy import LARGEST_EVIDENCE, OccupancyMap, Rule
+from uavexp.mapping.occupancy import LARGEST_EVIDENCE, FusionRule, OccupancyMap
 from uavexp.parameters import Count, Positive, between
 
 
@@ -61,9 +61,9 @@ class MapParameters(FieldParameters):
             f"occupied_evidence must be <= max_evidence = {self.max_evidence}, got {self.occupied_evidence}",
         )
 
-    def rule(self) -> Rule:
+    def rule(self) -> FusionRule:
         """Return the fusion and occupancy rule in the form that kernels take."""
-        return Rule(
+        return FusionRule(
             truncation_m=self.truncation_m,
             max_weight=self.max_weight,
             occupied_below_m=self.occupied_below_m,

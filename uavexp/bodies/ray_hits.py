@@ -8,7 +8,7 @@ import numba as nb
 import numpy as np
 
 from uavexp.arrays import Float, Float32, UInt8
-from uavexp.bodies.points import LOWEST_M
+from uavexp.bodies.distance import LOWEST_M
 from uavexp.types import Bodies, Shape
 
 _SPHERE, _CYLINDER = int(Shape.SPHERE), int(Shape.CYLINDER)
