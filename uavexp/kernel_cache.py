@@ -49,8 +49,11 @@ class KernelLocator:
         return next((locator for locator in found if locator is not None), None)
 
     def ensure_cache_path(self) -> None:
-        """Create the folder."""
+        """Create the folder; remove what earlier versions of the source file have left there."""
         self._folder.mkdir(parents=True, exist_ok=True)
+        for kept in self._folder.glob(f"{self._file.stem}.*.nb[ci]"):
+            if f"-{self._name_of_stamp()}." not in kept.name:
+                kept.unlink(missing_ok=True)
 
     def get_cache_path(self) -> str:
         """Folder of the compiled kernels."""
@@ -61,8 +64,11 @@ class KernelLocator:
         return source_stamp(self._file)
 
     def get_disambiguator(self) -> str:
-        """Tell kernels of the same name apart."""
-        return str(self._line)
+        """Tell kernels of the same name apart, and versions: an index may name classes that are gone."""
+        return f"{self._line}-{self._name_of_stamp()}"
+
+    def _name_of_stamp(self) -> str:
+        return self.get_source_stamp()[:12]
 
 
 def has_kernels() -> bool:

@@ -64,15 +64,31 @@ def test_a_kernel_notices_a_change_two_files_away(package: Path) -> None:
     assert run(package) == (60.0, 1)
 
 
+def test_a_kernel_of_an_argument_whose_class_is_gone_is_compiled_anew(package: Path) -> None:
+    """Regression: after a renamed class, reading the index of before raised in every flight."""
+    source = (
+        "import numba as nb\nfrom typing import NamedTuple\nclass Old(NamedTuple):\n    x: float\n"
+        "@nb.njit(cache=True)\ndef inner(pair): return 2.0 * pair.x\n"
+        "def call(x): return inner(Old(x))\ncall.stats = inner.stats\nkernel = call\n"
+    )
+    (package / "a.py").write_text(source)
+    assert run(package) == (2.0, 0)
+    (package / "a.py").write_text(source.replace("Old", "New"))
+    assert run(package) == (2.0, 0)
+    assert run(package) == (2.0, 1)
+    kept = [file.name for file in (package / "__pycache__").glob("a.*.nbi")]
+    assert len(kept) == 1, kept
+
+
 def test_our_kernels_are_kept_by_our_locator() -> None:
     assert isinstance(geometry.wrap_angle._cache._impl.locator, kernel_cache.KernelLocator)
 
 
 def test_a_stamp_covers_what_a_file_imports() -> None:
     imported = kernel_cache._imports(PACKAGE / "geometry.py")
-    assert PACKAGE / "types.py" in imported
+    assert PACKAGE / "arrays.py" in imported
     assert kernel_cache.source_stamp(PACKAGE / "geometry.py") != kernel_cache.source_stamp(
-        PACKAGE / "types.py"
+        PACKAGE / "arrays.py"
     )
 
 
