@@ -77,3 +77,4 @@ def test_its_experiment_has_the_metric_and_a_report(project: Path) -> None:
     assert len(trials) == 6
     assert (trials["climb_m"] >= 0.0).all()
     assert "Height gained" in (project / "study/report.html").read_text()
+    assert "no trials of" not in (project / "study/claims.csv").read_text()

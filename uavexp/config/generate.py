@@ -25,6 +25,8 @@ import yaml  # type: ignore[import-untyped]
 
 from uavexp.config.build import GROUPS, TARGET, component_class, nested_groups
 from uavexp.config.options import RUNNER_GROUP
+from uavexp.config.trust import VARIABLE, is_trusted
+from uavexp.errors import ConfigError, UavexpError, one_line
 from uavexp.parameters import MISSING, Unknown, is_option, parameter_types, plain
 from uavexp.paths import PACKAGE, conf_folder
 
@@ -120,8 +122,24 @@ def _place(cls: type) -> Path:
     return conf_folder().joinpath(*group, f"{name}.yaml")
 
 
-if __name__ == "__main__":
-    for target in sys.argv[1:]:
-        sys.stdout.write(option_yaml(component_class(target.split(".")[1], target)))
-    for path, text in option_files().items() if not sys.argv[1:] else ():
+def _class_of(target: str) -> type:
+    if target.count(".") < 2 or not is_trusted(target):
+        raise ConfigError(f"{target} is no class of uavexp or of a package that {VARIABLE} names")
+    return component_class(target.split(".")[1], target, "option")
+
+
+def main(targets: list[str]) -> int:
+    """Print the yaml of the classes named; without any, write that of every shipped option."""
+    try:
+        texts = [option_yaml(_class_of(target)) for target in targets]
+    except UavexpError as error:
+        sys.stderr.write(f"error: {one_line(error)}; type PACKAGE.MODULE.CLASS\n")
+        return 2
+    sys.stdout.write("".join(texts))
+    for path, text in option_files().items() if not targets else ():
         path.write_text(text, encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -114,10 +114,18 @@ def _judge(results: Results, claim: Claim) -> Judgement | None:
     if not there and claim.is_one_of_many:
         return None
     verdict, evidence = (
-        claim.judge(part, **claim.options) if there else (Verdict.NOT_TESTABLE, "the trials do not have it")
+        claim.judge(part, **claim.options) if there else (Verdict.NOT_TESTABLE, _lacking(part, claim))
     )
     statement = claim.says.format(**_words(results, claim))
     return Judgement(statement=statement, source=claim.source, verdict=verdict, evidence=evidence)
+
+
+def _lacking(results: Results, claim: Claim) -> str:
+    """What the trials do not have of a claim."""
+    arms = [arm for arm in claim.arms if arm not in results.arms]
+    if arms:
+        return f"no trials of {' and '.join(arms)}; the study has {'; '.join(results.arms)}"
+    return f"no {' or '.join(m.column for m in claim.metrics if not results.panel.has(m))} in the trials"
 
 
 def _words(results: Results, claim: Claim) -> dict[str, Any]:

@@ -25,7 +25,16 @@ from uavexp.errors import RecordError
 from uavexp.log import TrialLog
 from uavexp.store.logs import read_log
 from uavexp.store.records import LOG, WALL, canonical_json, cell_digest, read_record, trial_name
-from uavexp.store.table import FIRST_OF_REPLANS, REPLANS, TABLE, Row, replan_rows, row_of, write_table
+from uavexp.store.table import (
+    FIRST_OF_REPLANS,
+    REPLANS,
+    TABLE,
+    Row,
+    replan_rows,
+    row_of,
+    with_every_cause,
+    write_table,
+)
 from uavexp.store.worlds import read_world
 from uavexp.types import World
 
@@ -156,7 +165,7 @@ def collect(folder: Path) -> list[Row]:
         row = row_of(record, read_wall(item), labels)
         trials.append((index, record["seed"], row, list(replan_rows(record, labels))))
     trials.sort(key=lambda trial: trial[:2])
-    rows = [row for _, _, row, _ in trials]
+    rows = with_every_cause([row for _, _, row, _ in trials])
     write_table(folder / TABLE, rows)
     write_table(folder / REPLANS, [row for *_, replans in trials for row in replans], FIRST_OF_REPLANS)
     return rows

@@ -79,6 +79,12 @@ def row_of(record: Record, wall: Mapping[str, Any], labels: Mapping[str, str]) -
     }
 
 
+def with_every_cause(rows: Sequence[Row]) -> list[Row]:
+    """The rows with a count of 0 for each cause that another flight replanned for, and this one did not."""
+    counted = {name for row in rows for name in row if name.startswith("replans_")}
+    return [row | {name: 0 for name in counted - row.keys()} if "replans" in row else row for row in rows]
+
+
 def pooled_versions(versions: Iterable[tuple[str, ...]]) -> str:
     """A sentence about trials of several versions in one table; empty for one version.
 
