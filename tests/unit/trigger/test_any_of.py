@@ -137,7 +137,7 @@ def test_a_policy_can_be_added() -> None:
         ("+trigger.policies.x={_target_: uavexp.trigger.tbr.Tbr, period: 3}", "trigger.policies.x.period"),
         ("+trigger.policies.x={interval_s: 3}", "trigger.policies.x must be a component of trigger"),
         ("+trigger.policies.x=3", "trigger.policies.x must be a component of trigger"),
-        ("trigger.policies=3", "trigger.policies must be named components of trigger, got 3"),
+        ("trigger.policies=3", "trigger.policies must be one of trigger, or several by name, got 3"),
         ("trigger.policies={}", "policies must name one policy or more"),
         (
             "trigger.policies.mcr.monitor_radius_m=5",
@@ -161,7 +161,7 @@ def test_patience_that_would_end_a_flight_as_stuck_is_refused() -> None:
     assert told == "mission.patience_s must be < stuck_s / 2 = 10.0, got 10.0"
 
 
-def test_only_the_trigger_holds_components() -> None:
+def test_only_trigger_and_planner_hold_components() -> None:
     config = cell().config
     holding = [group for group in GROUPS if any(isinstance(value, dict) for value in config[group].values())]
-    assert holding == ["trigger"]
+    assert holding == ["trigger", "planner"]
