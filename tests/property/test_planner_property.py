@@ -105,9 +105,10 @@ def test_plan_keeps_its_promises(name: str, data: st.DataObject) -> None:
     np.testing.assert_allclose(position[0], request.position_m, atol=1e-9)
     np.testing.assert_allclose(velocity[0], request.velocity_mps, atol=1e-6)
     np.testing.assert_allclose(acceleration[0], request.acceleration_mps2, atol=1e-5)
-    np.testing.assert_allclose(position[-1], request.goal.position_m, atol=1e-6)
+    np.testing.assert_allclose(position[-1], request.goal.position_m, atol=1e-6 if tree else 1e-9)
+    beyond = 1.0 + 1e-6 if tree else 1.03 if name == "bspline_mpc" else 1.02
     # a start at full speed that still accelerates cannot help going a little beyond
-    assert np.linalg.norm(velocity, axis=1).max() <= LIMITS.max_speed_mps * (1.0 + 1e-6 if tree else 1.03)
+    assert np.linalg.norm(velocity, axis=1).max() <= LIMITS.max_speed_mps * beyond
     assert np.linalg.norm(acceleration, axis=1).max() <= LIMITS.max_acceleration_mps2 * (1.0 + 1e-6)
     clearance = request.field.distance_m(position)
     kept = int(np.argmax(clearance >= 0.26))  # a start that is nearer may leave
