@@ -28,7 +28,7 @@ from uavexp.planner.find.voxels.moves import LENGTHS, STEPS, open_moves
 
 RULE_NONE, RULE_OR, RULE_AND = 0, 1, 2
 COUNT_MADE, COUNT_OPEN = 0, 1  # readings of N_horizontal
-LEVEL_STEPS = 5  # N_horizontal that allows a vertical step
+_LEVEL_STEPS = 5  # N_horizontal that allows a vertical step
 _GOAL_BAND = 2  # voxels of height around the goal within which vertical steps are suppressed
 _FIRST_NODES = 4096
 _NODE = np.dtype(
@@ -59,19 +59,19 @@ def _may_climb(rule: int, reading: int, moves: int, height: int, made: int) -> b
         height: above the goal, voxels.
         made: level steps since the last vertical one.
     """
-    if rule == 0:
+    if rule == RULE_NONE:
         return True
     level = moves & LEVEL
     count = made
-    if reading == 1:
+    if reading == COUNT_OPEN:
         count = 0
         while level != 0:
             level &= level - 1
             count += 1
     hemmed = moves & LEVEL == 0
-    far = abs(height) > 2
-    enough = count >= 5
-    return (hemmed and far and enough) if rule == 2 else (hemmed or far or enough)
+    far = abs(height) > _GOAL_BAND
+    enough = count >= _LEVEL_STEPS
+    return (hemmed and far and enough) if rule == RULE_AND else (hemmed or far or enough)
 
 
 @nb.njit(cache=True)
@@ -187,7 +187,7 @@ def find_directed(
             if not moves >> n & 1:
                 continue
             other = cell + STEPS[n, 0] * slab + STEPS[n, 1] * row + STEPS[n, 2]
-            steps = 0 if STEPS[n, 2] != 0 else min(made + 1, 5)
+            steps = 0 if STEPS[n, 2] != 0 else min(made + 1, _LEVEL_STEPS)
             key = (other * 27 + n) * 6 + (steps if counts else 0) if exact else other
             penalty = 0.0 if before == 13 else turn_weight * (1.0 - COSINE[before, n])
             there = cost + LENGTHS[n] + (first_costs[n] if before == 13 else 0.0)
