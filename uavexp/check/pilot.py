@@ -19,7 +19,7 @@ from uavexp.recorder import Stopwatch
 from uavexp.trajectory import Trajectory
 from uavexp.types import Decision, Goal, Observation, PlanRequest, PlanResult, PlanStatus, Reference
 
-_STEP_S, _LATENCY_S = 1 / 128, 4 / 128  # exact in binary: a plan and the step that adopts it meet
+_STEP_S, _LATENCY_S = 0.01, 0.03  # not exact in binary: a plan may start a rounding after its step
 _START_M, _TARGET_M = np.array([1.0, 2.0, 1.0]), np.array([9.0, 2.5, 1.2])
 _FIELD = field_from(empty((10.0, 4.0, 2.0)))
 _SLOW_S = 12.0  # of each plan: far from every limit
@@ -68,7 +68,7 @@ class _Crew:
 
 
 def _flown(make: Make, crew: _Crew, duration_s: float = 6.0) -> tuple[Piloting, list[Reference]]:
-    """A flight that is tracked exactly: 128 references, about 10 ESDF updates and 5 goals a second."""
+    """A flight that is tracked exactly: 100 references, 10 ESDF updates and 5 goals a second."""
     pilot: Piloting = make().begin(
         Crew(
             explorer=crew,
@@ -86,9 +86,9 @@ def _flown(make: Make, crew: _Crew, duration_s: float = 6.0) -> tuple[Piloting, 
     references = []
     for step in range(round(duration_s / _STEP_S)):
         references.append(pilot.reference(step * _STEP_S, _STEP_S))
-        if step % 12 == 0:
+        if step % 10 == 0:
             seen = _seen(pilot, step * _STEP_S, references[-1])
-            if step % 24 == 0:
+            if step % 20 == 0:
                 pilot.explore(seen)
             pilot.decide(_seen(pilot, step * _STEP_S, references[-1]))
     return pilot, references

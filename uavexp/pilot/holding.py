@@ -93,9 +93,11 @@ class HoldingPilot:
             return self._look_around(step_s)
         if self.trajectory is None:
             return self._hold(self.crew.start_m)
-        ahead_s = max(time_s, self._moves_s) + self.rules.yaw_lookahead_s
-        ahead_s = min(ahead_s, max(time_s, self.trajectory.end_s))
-        position, velocity, acceleration = evaluate(self.trajectory, np.array([time_s, ahead_s]))
+        # A plan may be adopted a rounding before it starts, where it would stand still.
+        now_s = max(time_s, self.trajectory.start_s)
+        ahead_s = max(now_s, self._moves_s) + self.rules.yaw_lookahead_s
+        ahead_s = min(ahead_s, max(now_s, self.trajectory.end_s))
+        position, velocity, acceleration = evaluate(self.trajectory, np.array([now_s, ahead_s]))
         rate_radps = self.heading.turn_to(bearing_rad(self.best_goal, position[1] - position[0]), step_s)
         return Reference(
             position_m=position[0],
@@ -103,7 +105,7 @@ class HoldingPilot:
             acceleration_mps2=acceleration[0],
             yaw_rad=self.heading.yaw_rad,
             yaw_rate_radps=rate_radps,
-            jerk_mps3=derivative(self.trajectory, np.array([time_s]), 3)[0],
+            jerk_mps3=derivative(self.trajectory, np.array([now_s]), 3)[0],
         )
 
     def explore(self, observation: Observation) -> None:
