@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import numba as nb
 import numpy as np
 
-from uavexp.arrays import Bool, Float, Float32, UInt8
+from uavexp.arrays import Bool, Float, Float32, Int32, UInt8
 
 UNKNOWN, FREE, OCCUPIED = 0, 1, 2  # values of `DistanceField.state`
+TILE = 8  # columns along a tile's edge in `DistanceField.changed`
 
 
 @nb.njit(cache=True, inline="always")
@@ -104,9 +106,11 @@ class DistanceField:
     max_distance_m: float
     distance: Float32  # (X, Y, Z) signed distance at voxel centres, m
     state: UInt8  # (X, Y, Z) UNKNOWN, FREE or OCCUPIED
+    # how often each tile of TILE x TILE columns has changed; empty: nothing ever does
+    changed: Int32 = dataclasses.field(default_factory=lambda: np.zeros((0, 0), np.int32))
 
     def __post_init__(self) -> None:
-        for name in ("distance", "state"):
+        for name in ("distance", "state", "changed"):
             view = getattr(self, name).view()
             view.flags.writeable = False
             object.__setattr__(self, name, view)

@@ -1,11 +1,44 @@
-"""Which changed voxels lie near a trajectory: equation (20) of paper 1 on arrays."""
+"""Which voxels have changed near a trajectory: equation (20) of paper 1 on arrays."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numba as nb
 import numpy as np
 
-from uavexp.arrays import Float, Float32, Int, Int32
+from uavexp.arrays import Float, Float32, Int, Int32, UInt8
+from uavexp.field import DistanceField
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MapNear:
+    """A map as it was in the columns near a trajectory."""
+
+    column: Int  # (C,) flat indices, ascending
+    distance: Float32  # (C, Z) m
+    state: UInt8  # (C, Z)
+
+
+def columns_near(field: DistanceField, points_m: Float, radius_m: float) -> Int:
+    """Flat indices (C,), ascending, of all columns with a voxel nearer to a point (P, 3), and a few more."""
+    near = np.zeros(field.distance.shape[:2], dtype=np.bool_)
+    reach = int(radius_m / field.voxel_size_m) + 1
+    cell = np.floor((points_m[:, :2] - field.origin_m[:2]) / field.voxel_size_m).astype(np.int64)
+    low, high = (cell - reach).clip(0), (cell + reach + 1).clip(0)
+    for (i0, j0), (i1, j1) in set(zip(map(tuple, low), map(tuple, high), strict=True)):
+        near[i0:i1, j0:j1] = True
+    return np.flatnonzero(near)
+
+
+def map_near(field: DistanceField, column: Int) -> MapNear:
+    """Copy what a map holds in columns (C,)."""
+    height = field.state.shape[2]
+    return MapNear(
+        column=column,
+        distance=field.distance.reshape(-1, height)[column],
+        state=field.state.reshape(-1, height)[column],
+    )
 
 
 @nb.njit(cache=True)

@@ -22,6 +22,7 @@ Two such transforms, towards occupied and towards other voxels, make the signed 
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -101,7 +102,8 @@ class SignedDistance:
     @staticmethod
     def _stages(to_occupied: bool, start: int, shape: tuple[int, int, int]) -> _Stages:
         peak = np.full(shape[0] * shape[1], start, np.int16)
-        along = [np.full(peak.size * shape[2], start, np.int16) for _ in range(3)]
+        fill = np.zeros if start == 0 else functools.partial(np.full, fill_value=start)  # zeros cost nothing
+        along = [fill(peak.size * shape[2], dtype=np.int16) for _ in range(3)]
         return _Stages(to_occupied, peak, start, *along)
 
     @staticmethod

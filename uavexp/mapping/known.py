@@ -18,12 +18,13 @@ import math
 import numba as nb
 import numpy as np
 
-from uavexp.arrays import Bool, Float, Float32, Int, UInt8
+from uavexp.arrays import Bool, Float, Float32, Int, Int32, UInt8
 from uavexp.errors import require
 from uavexp.field import FREE, OCCUPIED, DistanceField
 from uavexp.mapping.esdf import SignedDistance
 from uavexp.mapping.map_parameters import FieldParameters
 from uavexp.mapping.occupancy import grid_shape
+from uavexp.mapping.tiles import count_changes, no_changes
 from uavexp.parameters import NonNegative, option
 from uavexp.scan import Scan
 from uavexp.scene import Scene
@@ -113,6 +114,7 @@ class Known(FieldParameters):
     _scene: Scene | None = dataclasses.field(default=None, init=False, repr=False)
     _esdf: SignedDistance = dataclasses.field(init=False, repr=False)
     _field: DistanceField = dataclasses.field(init=False, repr=False)
+    _tiles: Int32 = dataclasses.field(init=False, repr=False)
     _made: UInt8 = dataclasses.field(init=False, repr=False)  # state as of the next update
     _state: UInt8 = dataclasses.field(init=False, repr=False)  # of the field
 
@@ -134,12 +136,14 @@ class Known(FieldParameters):
         self._scene = scene
         self._esdf = SignedDistance(shape, self.voxel_size_m, self.max_distance_m)
         self._made, self._state = np.zeros(shape, np.uint8), np.zeros(shape, np.uint8)
+        self._tiles = no_changes(shape)
         self._field = DistanceField(
             origin_m=np.array(bounds_m[0], dtype=np.float64),
             voxel_size_m=self.voxel_size_m,
             max_distance_m=self.max_distance_m,
             distance=self._esdf.distance,
             state=self._state,
+            changed=self._tiles,
         )
 
     def mark_free(self, centre_m: Float, radius_m: float) -> None:
@@ -165,7 +169,9 @@ class Known(FieldParameters):
         flipped = np.flatnonzero((before == OCCUPIED) != (after == OCCUPIED)).astype(np.int32)
         first_seen = np.flatnonzero((before == 0) & (after != 0)).astype(np.int32)
         before[:] = after
-        return self._esdf.update(time_s, self._state, flipped, first_seen)
+        update = self._esdf.update(time_s, self._state, flipped, first_seen)
+        count_changes(update.voxel, self._state.shape, self._tiles)
+        return update
 
     @property
     def field(self) -> DistanceField:

@@ -38,13 +38,14 @@ from uavexp.arrays import Float, Float32, Int32, UInt8
 from uavexp.errors import WorldError
 from uavexp.field import FREE, OCCUPIED, UNKNOWN, DistanceField
 from uavexp.mapping.esdf import SignedDistance
+from uavexp.mapping.tiles import count_changes, no_changes
 from uavexp.types import MapUpdate
 
 # bits of a live voxel's byte: 0-1 state, 2 on the list of changes, 3-7 evidence
 _STATE, _LISTED, _EVIDENCE = 3, 4, 3
 LARGEST_EVIDENCE = 31
 _LONGEST = 30_000  # voxels along an axis: kernels count them in 16 bits
-_BYTES_PER_VOXEL = 58  # TSDF and state 7, ESDF 19, lists at their longest 16, rays 8, Open3D's blocks 8
+_BYTES_PER_VOXEL = 26  # of a voxel that was seen: TSDF and state 7, ESDF 19; lists are as long as needed
 
 
 class FusionRule(NamedTuple):
@@ -180,7 +181,7 @@ def grid_shape(
         bounds_m: (2, 3) lower and upper corner.
         voxel_size_m: edge of a voxel, m.
         max_memory_mb: refuse grids that need more, 10^6 bytes.
-        bytes_per_voxel: of everything kept for a voxel.
+        bytes_per_voxel: of everything kept for a voxel; where nothing was seen, little of it is used.
 
     Raises:
         WorldError: the bounds are not a box, or the grid would need too much memory.
@@ -228,12 +229,14 @@ class OccupancyMap:
         self._first_seen: Int32 = np.empty(size, np.int32)
         self._rays: tuple[Float32, Int32] | None = None
         self._esdf = SignedDistance(self.shape, voxel_size_m, max_distance_m)
+        self._tiles = no_changes(self.shape)
         self.field = DistanceField(
             origin_m=self.origin_m,
             voxel_size_m=voxel_size_m,
             max_distance_m=max_distance_m,
             distance=self._esdf.distance,
             state=self.voxels.state.reshape(self.shape),
+            changed=self._tiles,
         )
 
     def mark_free(self, centre_m: Float, radius_m: float) -> None:
@@ -253,4 +256,6 @@ class OccupancyMap:
         flips, firsts = _publish(self.voxels, self.changed, self._flipped, self._first_seen)
         self.changed = 0
         state = self.voxels.state.reshape(self.shape)
-        return self._esdf.update(time_s, state, self._flipped[:flips], self._first_seen[:firsts])
+        update = self._esdf.update(time_s, state, self._flipped[:flips], self._first_seen[:firsts])
+        count_changes(update.voxel, self.shape, self._tiles)
+        return update

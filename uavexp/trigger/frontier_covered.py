@@ -16,7 +16,7 @@ gone" rule of next-best-view planners (Bircher et al. 2016).
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import field, replace
 
 from uavexp import causes
 from uavexp.field import DistanceField
@@ -50,7 +50,7 @@ class FrontierCovered:
 
     def planned(self, trajectory: Trajectory, field: DistanceField) -> None:
         """Keep what was known when the plan was made."""
-        self._trajectory, self._at_plan = trajectory, field.copy()
+        self._trajectory, self._at_plan = trajectory, replace(field, state=field.state.copy())
 
     def decide(self, observation: Observation) -> Decision:
         """Replan on the first of collision, arrival, cover and clock that holds."""

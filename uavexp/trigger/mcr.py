@@ -25,10 +25,10 @@ from enum import StrEnum
 import numpy as np
 
 from uavexp import causes
-from uavexp.arrays import Float, Int32
+from uavexp.arrays import Float, Float32, Int32
 from uavexp.errors import require
 from uavexp.field import DistanceField
-from uavexp.map_change import changed_near
+from uavexp.map_change import MapNear, changed_near, columns_near, map_near
 from uavexp.mapping.base import MapBackend
 from uavexp.parameters import Count, NonNegative, Positive, option
 from uavexp.trajectory import Trajectory, evaluate, sample_times
@@ -103,7 +103,7 @@ class Mcr:
     min_interval_s: NonNegative = 0.0  # s, least time between replans
     _touch_m: float = field(init=False, repr=False, default=0.0)
     _trajectory: Trajectory | None = field(init=False, repr=False, default=None)
-    _at_plan: DistanceField | None = field(init=False, repr=False, default=None)
+    _at_plan: MapNear | None = field(init=False, repr=False, default=None)
     _planned_s: float = field(init=False, repr=False, default=-math.inf)
     _points_m: Float = field(init=False, repr=False, default_factory=lambda: np.zeros((0, 3)))
     _times_s: Float = field(init=False, repr=False, default_factory=lambda: np.zeros(0))
@@ -132,7 +132,7 @@ class Mcr:
         self._points_m = evaluate(trajectory, self._times_s)[0]
         self._clearance_m = field.distance_m(self._points_m)
         if self.since is Since.PLAN:
-            self._at_plan = field.copy()
+            self._at_plan = map_near(field, columns_near(field, self._points_m, self.monitor_radius_m))
 
     def decide(self, observation: Observation) -> Decision:
         """Return the map event, else the goal event, else no."""
@@ -199,7 +199,7 @@ class Mcr:
             voxel = update.voxel[counted]
             old, new = update.old_distance_m[counted], update.new_distance_m[counted]
         else:
-            voxel, old, new = self._since_plan(now)
+            voxel, old, new = self._since_plan(self._at_plan, now)
         both = self.sign is Sign.BOTH
         near, largest_m = changed_near(
             voxel,
@@ -215,14 +215,15 @@ class Mcr:
         )
         return near, largest_m
 
-    def _since_plan(self, now: DistanceField) -> tuple[Int32, np.ndarray, np.ndarray]:
+    def _since_plan(self, then: MapNear, field: DistanceField) -> tuple[Int32, Float32, Float32]:
         """Voxels whose distance differs from that at the plan; first sights as configured."""
-        assert self._at_plan is not None
-        differs = now.distance != self._at_plan.distance
+        now = map_near(field, then.column)
+        differs = now.distance != then.distance
         if self.first_sight is not FirstSight.ALL:
-            counted = self._at_plan.state != 0
+            counted = then.state != 0
             if self.first_sight is FirstSight.OCCUPIED:
                 counted = counted | (now.state == 2)
             differs &= counted
-        voxel = np.flatnonzero(differs).astype(np.int32)
-        return voxel, self._at_plan.distance.ravel()[voxel], now.distance.ravel()[voxel]
+        at, k = np.nonzero(differs)
+        voxel = (then.column[at] * differs.shape[1] + k).astype(np.int32)
+        return voxel, then.distance[at, k], now.distance[at, k]

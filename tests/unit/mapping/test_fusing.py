@@ -248,3 +248,22 @@ def test_missing_gpu_is_named_with_the_package_that_brings_it():
     absent = VoxelBlockGrid(device="CUDA:99")  # cheap to construct: only reset looks for the device
     with pytest.raises(ConfigError, match="open3d in place of open3d-cpu"):
         absent.reset(BOUNDS_M, NOTHING)
+
+
+def test_tiles_in_which_anything_changed_are_counted_and_no_others(option):
+    backend = begin(option)
+    field = backend.field
+    before, counted = field.copy(), field.changed.copy()
+    for _ in fly_past(backend, ROOM):
+        differs = ((field.distance != before.distance) | (field.state != before.state)).any(axis=2)
+        tiles = np.add.reduceat(np.add.reduceat(differs, range(0, 80, 8), axis=0), range(0, 60, 8), axis=1)
+        np.testing.assert_array_equal(field.changed > counted, tiles > 0)
+        before, counted = field.copy(), field.changed.copy()
+    assert (counted > 0).any()
+    assert (counted == 0).any()
+
+
+def test_a_hall_of_100_m_is_mapped_with_the_default_memory(option):
+    backend = FUSING[option]()
+    backend.reset(np.array([[-0.2, -0.2, -0.2], [100.2, 100.2, 3.2]]), NOTHING)
+    assert backend.field.state.size > 30_000_000

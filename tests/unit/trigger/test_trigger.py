@@ -11,7 +11,8 @@ import pytest
 from uavexp.check.hall import LIMITS, STRAIGHT, change, goal_at, observe, room
 from uavexp.errors import ConfigError
 from uavexp.field import DistanceField
-from uavexp.map_change import changed_near
+from uavexp.map_change import changed_near, columns_near, map_near
+from uavexp.trajectory import evaluate, sample_times
 from uavexp.trigger.mcr import Mcr
 from uavexp.trigger.ssp import Ssp
 from uavexp.trigger.tbr import Tbr
@@ -53,6 +54,33 @@ def test_changed_near_is_the_equation_by_brute_force() -> None:
         size = np.abs(drop) if both else drop
         np.testing.assert_array_equal(near, voxel[inside & (size > 0.3)])
         assert largest == pytest.approx(size[inside].max())
+
+
+def test_columns_near_hold_every_voxel_in_reach_and_few_others() -> None:
+    field, rng = room(), np.random.default_rng(0)
+    centres = field.voxel_centres_m(np.arange(field.state.size)).reshape(*field.state.shape, 3)
+    for radius_m in (0.3, 0.95, 2.0):
+        points_m = rng.uniform([-1.0, -1.0, 0.0], [8.0, 5.0, 2.0], (4, 3))  # outside of the map, too
+        column = columns_near(field, points_m, radius_m)
+        away_m = centres[..., None, :] - points_m
+        inside = (np.linalg.norm(away_m, axis=-1) < radius_m).any(axis=(2, 3))
+        assert set(np.flatnonzero(inside)) <= set(column)
+        beside_m = np.abs(away_m[:, :, 0, :, :2]).max(axis=-1).min(axis=-1)
+        assert (beside_m.reshape(-1)[column] < radius_m + 0.2).all()
+        assert (np.diff(column) > 0).all()
+        np.testing.assert_array_equal(map_near(field, column).state, field.state.reshape(70 * 40, 20)[column])
+
+
+def test_changes_since_the_plan_are_those_of_the_whole_map_near_it() -> None:
+    before, after = room(), room(((3.0, 3.2, 1.0), (3.2, 3.4, 1.2)), ((6.8, 0.0, 0.0), (7.0, 0.2, 2.0)))
+    policy = mcr(judge="region", extent="whole", first_sight="all")
+    voxel = np.flatnonzero(before.distance != after.distance).astype(np.int32)
+    old, new = before.distance.ravel()[voxel], after.distance.ravel()[voxel]
+    points_m = evaluate(STRAIGHT, sample_times(STRAIGHT, 1.0, 0.05))[0]
+    shape = np.array(after.state.shape)
+    expected, _ = changed_near(voxel, old, new, shape, after.origin_m, 0.1, points_m, 2.0, 0.15, False)
+    assert 0 < len(expected) < len(voxel)
+    np.testing.assert_array_equal(decide(policy, before, after).voxel, expected)
 
 
 def test_literal_fires_on_any_voxel_in_the_tube_and_on_none_outside() -> None:
