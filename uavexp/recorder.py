@@ -26,6 +26,7 @@ from uavexp.log import (
     TrackRows,
     TrialLog,
 )
+from uavexp.mission.base import Flown
 from uavexp.path_clearance import clearance_ahead_m
 from uavexp.scene import Scene
 from uavexp.types import (
@@ -40,8 +41,15 @@ from uavexp.types import (
     World,
 )
 
-_Step = tuple[float, Float, Float, Float, Float, Float, Float]
+_COLUMNS = 19
+_POSITION, _VELOCITY, _QUATERNION = slice(0, 3), slice(3, 6), slice(6, 10)
+_ESTIMATED, _REFERENCE, _ACCELERATION = slice(10, 13), slice(13, 16), slice(16, 19)
 _Tick = tuple[float, float, int, float, float]
+
+
+def times_s(first: int, end: int, step_s: float) -> Float:
+    """Times (N,) of the steps from the first to before the second."""
+    return np.asarray(step_s * np.arange(first, end), dtype=np.float64)
 
 
 @dataclass(slots=True)
@@ -64,32 +72,42 @@ class Stopwatch:
         self.laps_s.setdefault(name, []).append(lap_s)
 
 
-@dataclass(slots=True)
 class Recorder:
-    """Rows of the log: one per step, one per ESDF update, and the goals pursued."""
+    """Rows of the log: one per step, one per ESDF update, and the goals pursued.
 
-    steps: list[_Step] = field(default_factory=list)
-    ticks: list[_Tick] = field(default_factory=list)
-    goals_m: list[Float] = field(default_factory=list)
-    bodies: list[Bodies] = field(default_factory=list)  # one per step
-    tracks: list[Tracks] = field(default_factory=list)  # one per ESDF update
+    Args:
+        steps: of the flight at most.
+        step_s: of each.
 
-    def step(
-        self, time_s: float, state: State, estimate: State, reference: Reference, bodies: Bodies
-    ) -> None:
-        """Add the row of one simulation step."""
-        self.bodies.append(bodies)
-        self.steps.append(
-            (
-                time_s,
-                state.position_m,
-                state.velocity_mps,
-                state.quaternion_wxyz,
-                estimate.position_m,
-                reference.position_m,
-                reference.acceleration_mps2,
-            )
-        )
+    Attributes:
+        rows: (steps, 19), each step in its own: true position, velocity and attitude, estimated
+            position, position and acceleration of the reference.
+    """
+
+    def __init__(self, steps: int, step_s: float) -> None:
+        self.rows = np.empty((steps, _COLUMNS))
+        self._step_s = step_s
+        self._ticks: list[_Tick] = []
+        self._goals_m: list[Float] = []
+        self._bodies: list[Bodies] = []  # one per step, if there are any
+        self._tracks: list[Tracks] = []  # one per ESDF update
+
+    def step(self, step: int, state: State, estimate: State, reference: Reference, bodies: Bodies) -> None:
+        """Write the row of one simulation step."""
+        if len(bodies):
+            self._bodies.append(bodies)
+        row = self.rows[step]
+        row[_POSITION] = state.position_m
+        row[_VELOCITY] = state.velocity_mps
+        row[_QUATERNION] = state.quaternion_wxyz
+        row[_ESTIMATED] = estimate.position_m
+        row[_REFERENCE] = reference.position_m
+        row[_ACCELERATION] = reference.acceleration_mps2
+
+    def flown(self, first: int, end: int) -> Flown:
+        """What a mission is shown of the steps from the first to before the second."""
+        rows = self.rows[first:end]
+        return Flown(times_s(first, end, self._step_s), rows[:, _POSITION], rows[:, _QUATERNION])
 
     def tick(self, observation: Observation, score: float) -> None:
         """Add the row of one ESDF update, and the goal if it is a new one.
@@ -99,27 +117,27 @@ class Recorder:
         """
         clearance_m = float(observation.field.distance_m(observation.state.position_m[None])[0])
         changed = len(observation.update.voxel)
-        self.ticks.append(
+        self._ticks.append(
             (observation.time_s, clearance_m, changed, score, remaining_clearance_m(observation))
         )
-        self.tracks.append(observation.tracks)
+        self._tracks.append(observation.tracks)
         goal = observation.goal
-        if goal is not None and not (self.goals_m and np.array_equal(self.goals_m[-1], goal.position_m)):
-            self.goals_m.append(goal.position_m)
+        if goal is not None and not (self._goals_m and np.array_equal(self._goals_m[-1], goal.position_m)):
+            self._goals_m.append(goal.position_m)
 
-    def moved_m(self, steps: int) -> float:
-        """Largest distance from the present position in the last so many steps; inf before that."""
-        if len(self.steps) <= steps:
+    def moved_m(self, step: int, steps: int) -> float:
+        """Largest distance from the position at a step in the so many before it; inf without so many."""
+        if step < steps:
             return math.inf
-        recent_m = np.stack([row[1] for row in self.steps[-steps - 1 :: 100]])
-        return float(np.linalg.norm(recent_m - self.steps[-1][1], axis=1).max())
+        recent_m = self.rows[step - steps : step + 1 : 100, _POSITION]
+        return float(np.linalg.norm(recent_m - self.rows[step, _POSITION], axis=1).max())
 
     def log(
         self,
         *,
+        last_step: int,
         outcome: Outcome,
         reason: str,
-        step_s: float,
         scene: Scene,
         field: DistanceField,
         replans: tuple[Replan, ...],
@@ -133,22 +151,23 @@ class Recorder:
     ) -> TrialLog:
         """Return the finished log; true clearances are measured here, all at once."""
         mapped = np.flatnonzero(field.state == OCCUPIED)
-        position_m = np.stack([row[1] for row in self.steps])
-        fixed_m, mover_m = scene.fixed_distance_m(position_m), _mover_distance_m(position_m, self.bodies)
+        rows = self.rows[: last_step + 1]
+        position_m = rows[:, _POSITION]
+        fixed_m, mover_m = scene.fixed_distance_m(position_m), _mover_distance_m(position_m, self._bodies)
         return TrialLog(
             outcome=outcome,
             reason=reason,
-            step_s=step_s,
-            steps=_step_rows(self.steps, np.minimum(fixed_m, mover_m) if mover_m.size else fixed_m),
-            ticks=_tick_rows(self.ticks),
+            step_s=self._step_s,
+            steps=_step_rows(rows, self._step_s, np.minimum(fixed_m, mover_m) if mover_m.size else fixed_m),
+            ticks=_tick_rows(self._ticks),
             replans=replans,
             dropped_triggers=dropped_triggers,
             contacts=contacts,
-            goals_m=np.array(self.goals_m).reshape(-1, 3),
+            goals_m=np.array(self._goals_m).reshape(-1, 3),
             seen_share=seen_share,
             mapped_m=field.voxel_centres_m(mapped).astype(np.float32),
-            movers=_mover_rows(self.bodies, mover_m),
-            tracks=_track_rows(self.tracks),
+            movers=_mover_rows(self._bodies, mover_m, len(rows)),
+            tracks=_track_rows(self._tracks),
             first_plan=_first_plan(first_plan),
             limits=PlanLimits(
                 max_speed_mps=limits.max_speed_mps,
@@ -160,16 +179,15 @@ class Recorder:
         )
 
 
-def _step_rows(rows: Sequence[_Step], clearance_m: Float) -> Steps:
-    times_s, position, velocity, quaternion, estimated, reference, acceleration = zip(*rows, strict=True)
+def _step_rows(rows: Float, step_s: float, clearance_m: Float) -> Steps:
     return Steps(
-        time_s=np.array(times_s),
-        position_m=np.stack(position),
-        velocity_mps=np.stack(velocity),
-        quaternion_wxyz=np.stack(quaternion),
-        estimated_position_m=np.stack(estimated),
-        reference_position_m=np.stack(reference),
-        reference_acceleration_mps2=np.stack(acceleration),
+        time_s=times_s(0, len(rows), step_s),
+        position_m=rows[:, _POSITION].copy(),
+        velocity_mps=rows[:, _VELOCITY].copy(),
+        quaternion_wxyz=rows[:, _QUATERNION].copy(),
+        estimated_position_m=rows[:, _ESTIMATED].copy(),
+        reference_position_m=rows[:, _REFERENCE].copy(),
+        reference_acceleration_mps2=rows[:, _ACCELERATION].copy(),
         clearance_m=clearance_m,
     )
 
@@ -185,7 +203,9 @@ def _tick_rows(rows: Sequence[_Tick]) -> Ticks:
     )
 
 
-def _mover_rows(bodies: Sequence[Bodies], clearance_m: Float) -> MoverRows:
+def _mover_rows(bodies: Sequence[Bodies], clearance_m: Float, steps: int) -> MoverRows:
+    if not bodies:
+        return MoverRows(position_m=np.zeros((steps, 0, 3), dtype=np.float32))
     return MoverRows(
         shape=bodies[0].shape,
         half_size_m=bodies[0].half_size_m,
@@ -218,7 +238,7 @@ def _first_plan(plan: PlanResult | None) -> FirstPlan:
 
 def _mover_distance_m(position_m: Float, bodies: Sequence[Bodies]) -> Float:
     """Distance (T,) of the body's centre to the nearest mover, step by step; empty without movers."""
-    if not len(bodies[0]):
+    if not bodies:
         return np.zeros(0)
     return np.array([distance_m(now, point[None])[0] for now, point in zip(bodies, position_m, strict=True)])
 

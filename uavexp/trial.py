@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
 from uavexp.controller.base import Controller
 from uavexp.detection.base import Detection
 from uavexp.errors import require
-from uavexp.estimator.base import Believe, Estimator
+from uavexp.estimator.base import Estimator
 from uavexp.explorer.base import Explorer
 from uavexp.geometry import quaternion_from_yaw
 from uavexp.log import TrialLog
 from uavexp.mapping.base import MapBackend
 from uavexp.mission.base import Mission
+from uavexp.motion.base import Craft, Ending, Judge, Motion
+from uavexp.motion.compiled import compiled_motion
+from uavexp.motion.stepwise import Stepwise
 from uavexp.movers.base import Movers
 from uavexp.parameters import NonNegative, Positive, Whole, option
-from uavexp.pilot.base import Crew, Pilot, Piloting
+from uavexp.pilot.base import Crew, Pilot
 from uavexp.planner.base import Planner
 from uavexp.recorder import Recorder, Stopwatch, seen_share
 from uavexp.safety.base import Safety
@@ -112,52 +117,37 @@ def fly_trial(parts: Parts, seed: int, progress: Progress | None = None) -> tupl
 def fly(parts: Parts, world: World, seed: int, progress: Progress | None = None) -> TrialLog:
     """Fly one trial in a given world; every rate is a whole number of steps (see `Parts`)."""
     flight = _begin(parts, world, seed)
-    pilot, watch, recorder = flight.pilot, flight.watch, flight.recorder
+    motion, pilot, scene, watch = flight.motion, flight.craft.pilot, flight.scene, flight.watch
     period = {name: steps_per(parts.step_s, name, 1.0 / rate) for name, rate in parts.rates_hz().items()}
-    last_step = math.ceil(parts.mission.time_limit_s / parts.step_s)
-    estimate = state = _hover(world)
-    outcome: Outcome | None = None
-    tracks, bodies = Tracks.none(), parts.movers.at(0.0)
-    flight.scene.place(bodies)
+    tracks, ending = Tracks.none(), None
 
-    for step in range(last_step + 1):
+    for step, following in pairwise(flight.ticks(period)):
         time_s = step * parts.step_s
         if step % period["sensor.rate_hz"] == 0:
             with watch.lap("sense"):
-                scan = parts.sensor.capture(state, estimate, time_s)
-            if len(bodies):
+                scan = parts.sensor.capture(motion.state, motion.estimate, time_s)
+            if len(scene.bodies):
                 with watch.lap("detect"):
-                    scan, tracks = parts.detection.detect(scan, parts.mapping.field, bodies)
+                    scan, tracks = parts.detection.detect(scan, parts.mapping.field, scene.bodies)
             with watch.lap("integrate"):
                 parts.mapping.integrate(scan)
         reference = pilot.reference(time_s, parts.step_s)
         if step % period["mapping.esdf_rate_hz"] == 0:
             with watch.lap("esdf"):
                 update = parts.mapping.update(time_s)
-        observation = flight.observe(time_s, estimate, reference, update, tracks)
+        see = partial(flight.observe, time_s, reference, update, tracks)
         if step % period["explorer.rate_hz"] == 0:
-            pilot.explore(observation)
-            observation = flight.observe(time_s, estimate, reference, update, tracks)
+            pilot.explore(see())
         if step % period["mapping.esdf_rate_hz"] == 0:
-            recorder.tick(observation, pilot.decide(observation))
-        if step % period["controller.rate_hz"] == 0:
-            with watch.lap("control"):
-                command = parts.controller.command(estimate, reference)
-        recorder.step(time_s, state, estimate, reference, bodies)
-        outcome = flight.outcome(step, state, observation)
-        if outcome is not None:
+            seen = see()
+            flight.craft.recorder.tick(seen, pilot.decide(seen))
+        with watch.lap("fly"):
+            ending = motion.fly(step, following, reference, flight.judge(see()))
+        if ending is not None:
             break
-        with watch.lap("vehicle"):
-            moved = parts.vehicle.step(command, parts.step_s)
-            bodies = parts.movers.at(time_s + parts.step_s)
-            flight.scene.place(bodies)
-            state, touched = flight.contact.advance(state, moved, time_s + parts.step_s)
-            if touched:
-                parts.vehicle.place(state)
-        estimate = flight.believe(state, parts.step_s)
         if progress is not None and step % _LOOK_STEPS == 0:
             progress(time_s, f"{len(pilot.replans)} plans")
-    return flight.log(outcome or Outcome.TIMEOUT)
+    return flight.log(ending or Ending(following - 1, Outcome.TIMEOUT))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -167,52 +157,63 @@ class _Flight:
     parts: Parts
     world: World
     scene: Scene
-    pilot: Piloting
-    believe: Believe
-    contact: ContactTracker
-    recorder: Recorder
+    craft: Craft
+    motion: Motion
     watch: Stopwatch
 
-    def observe(
-        self, time_s: float, estimate: State, reference: Reference, update: MapUpdate, tracks: Tracks
-    ) -> Observation:
+    def ticks(self, period: Mapping[str, int]) -> list[int]:
+        """Numbers of the steps at which more is due than to fly on, and of the one that is not flown."""
+        end = len(self.craft.recorder.rows)
+        due = [steps for name, steps in period.items() if name != "controller.rate_hz"]
+        return sorted({end}.union(*(range(0, end, steps) for steps in (*due, _LOOK_STEPS))))
+
+    def observe(self, time_s: float, reference: Reference, update: MapUpdate, tracks: Tracks) -> Observation:
         """What the deciding roles see now."""
         return Observation(
             time_s=time_s,
-            state=estimate,
+            state=self.motion.estimate,
             reference=reference,
-            trajectory=self.pilot.trajectory,
+            trajectory=self.craft.pilot.trajectory,
             field=self.parts.mapping.field,
             update=update,
-            goal=self.pilot.goal,
-            best_goal=self.pilot.best_goal,
+            goal=self.craft.pilot.goal,
+            best_goal=self.craft.pilot.best_goal,
             target_m=self.parts.mission.target_m,
             flight_bounds_m=self.world.flight_bounds_m,
             tracks=tracks,
         )
 
-    def outcome(self, step: int, state: State, observation: Observation) -> Outcome | None:
-        """How the flight has ended: as the mission judges, or because nothing moves; None: it goes on."""
-        outcome = self.parts.mission.outcome(state, observation)
-        if outcome is None and step % _LOOK_STEPS == 0:
-            stuck_steps = math.ceil(self.parts.stuck_s / self.parts.step_s)
-            outcome = Outcome.STUCK if self.recorder.moved_m(stuck_steps) < _STILL_M else None
-        unplanned = outcome in (Outcome.STUCK, Outcome.EXPLORED) and not self.pilot.ever_planned
-        return Outcome.NO_PLAN if unplanned else outcome
+    def judge(self, observation: Observation) -> Judge:
+        """Who is asked of every step: the mission, and now and then whether the vehicle still moves."""
 
-    def log(self, outcome: Outcome) -> TrialLog:
+        def ending(first: int, end: int) -> Ending | None:
+            found = self.parts.mission.outcome(self.craft.recorder.flown(first, end), observation)
+            if first % _LOOK_STEPS == 0 and (found is None or found[0] > 0) and self._is_still(first):
+                found = 0, Outcome.STUCK
+            if found is None:
+                return None
+            unplanned = found[1] in (Outcome.STUCK, Outcome.EXPLORED) and not self.craft.pilot.ever_planned
+            return Ending(first + found[0], Outcome.NO_PLAN if unplanned else found[1])
+
+        return ending
+
+    def _is_still(self, step: int) -> bool:
+        stuck_steps = math.ceil(self.parts.stuck_s / self.parts.step_s)
+        return self.craft.recorder.moved_m(step, stuck_steps) < _STILL_M
+
+    def log(self, ending: Ending) -> TrialLog:
         """Everything that was recorded."""
-        parts, pilot, field = self.parts, self.pilot, self.parts.mapping.field
+        parts, pilot, field = self.parts, self.craft.pilot, self.parts.mapping.field
         limits, exploring = parts.vehicle.limits, parts.mission.target_m is None
-        return self.recorder.log(
-            outcome=outcome,
-            reason=self._reason(outcome),
-            step_s=parts.step_s,
+        return self.craft.recorder.log(
+            last_step=ending.step,
+            outcome=ending.outcome,
+            reason=self._reason(ending.outcome),
             scene=self.scene,
             field=field,
             replans=tuple(pilot.replans),
             dropped_triggers=pilot.dropped_triggers,
-            contacts=self.contact.contacts,
+            contacts=self.craft.contact.contacts,
             first_plan=pilot.first_plan,
             limits=limits,
             inspection=parts.mission.findings(),
@@ -225,7 +226,8 @@ class _Flight:
             return ""
         if outcome is Outcome.TIMEOUT:
             return f"not there after {self.parts.mission.time_limit_s:g} s"
-        why = f"; {self.pilot.failure}" if self.pilot.failure else ", and nothing asked for a new plan"
+        failure = self.craft.pilot.failure
+        why = f"; {failure}" if failure else ", and nothing asked for a new plan"
         return f"has not moved for {self.parts.stuck_s:g} s{why}"
 
 
@@ -266,13 +268,24 @@ def _begin(parts: Parts, world: World, seed: int) -> _Flight:
         flight_bounds_m=world.flight_bounds_m,
         watch=watch,
     )
+    scene.place(parts.movers.at(0.0))
+    hover = _hover(world)
+    craft = Craft(
+        pilot=parts.pilot.begin(crew),
+        controller=parts.controller,
+        vehicle=parts.vehicle,
+        believe=parts.estimator.begin(generator(seed, Stream.ESTIMATOR)),
+        movers=parts.movers,
+        contact=ContactTracker(scene=scene, body_size_m=limits.body_size_m),
+        recorder=Recorder(math.ceil(parts.mission.time_limit_s / parts.step_s) + 1, parts.step_s),
+        step_s=parts.step_s,
+        command_steps=steps_per(parts.step_s, "controller.rate_hz", 1.0 / parts.controller.rate_hz),
+    )
     return _Flight(
         parts=parts,
         world=world,
         scene=scene,
-        pilot=parts.pilot.begin(crew),
-        believe=parts.estimator.begin(generator(seed, Stream.ESTIMATOR)),
-        contact=ContactTracker(scene=scene, body_size_m=limits.body_size_m),
-        recorder=Recorder(),
+        craft=craft,
+        motion=compiled_motion(craft, hover) or Stepwise(craft=craft, state=hover, estimate=hover),
         watch=watch,
     )

@@ -19,7 +19,7 @@ LAYERS = (
     {"braking", "triangle_grid", "bodies", "scene"},
     {"cloud"},
     {"roles", "metrics", "inspection"},
-    {"recorder", "pilot", "trial"},
+    {"recorder", "pilot", "motion", "trial"},
     {"config"},
     {"flight", "__init__"},
     {"store", "check"},

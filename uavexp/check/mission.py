@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from uavexp.arrays import Float
 from uavexp.check.building import building
 from uavexp.check.hall import LIMITS, flight, hovering
 from uavexp.check.promise import Make, keep, same, untouched
+from uavexp.mission.base import Flown
 from uavexp.scene import Scene
 from uavexp.seeding import Stream, generator
 from uavexp.types import Goal, Limits, Observation, Outcome, World
@@ -48,6 +50,21 @@ def _at_the_start(world: World) -> Observation:
     )
 
 
+def _without_a_goal(world: World) -> Observation:
+    return replace(_at_the_start(world), best_goal=None)
+
+
+def _flown(position_m: Float) -> Flown:
+    """At places (N, 3), one after the other, until 95 s have passed."""
+    upright = np.tile([1.0, 0.0, 0.0, 0.0], (len(position_m), 1))
+    return Flown(np.linspace(0.0, 95.0, len(position_m)), position_m, upright)
+
+
+def _on_the_way(world: World) -> Flown:
+    """In 20 steps from the start to the target."""
+    return _flown(np.linspace(world.start_m, world.target_m, 20))
+
+
 def leaves_the_task_in_the_world(make: Make) -> None:
     """Start and flight bounds stay as they were drawn; the world may differ from what is known of it."""
     world = make().prepare(building(), generator(1, Stream.MISSION))
@@ -78,18 +95,29 @@ def has_its_target_within_the_flight_bounds(make: Make) -> None:
 def is_not_over_before_it_has_begun(make: Make) -> None:
     """At the start, with a goal to fly to, the flight goes on."""
     mission, world = _begun(make)
-    outcome = mission.outcome(hovering(world.start_m), _at_the_start(world))
+    outcome = mission.outcome(_flown(world.start_m[None]), _at_the_start(world))
     keep(outcome is None, f"it ends at 0 s: {outcome}")
 
 
 def ends_as_flights_end(make: Make) -> None:
-    """Wherever the vehicle is, the answer is an outcome or that the flight goes on."""
+    """The answer is one of the steps shown and an outcome, or that the flight goes on."""
     mission, world = _begun(make)
-    for share, point in enumerate(np.linspace(world.start_m, world.target_m, 20)):
-        seen = replace(_at_the_start(world), time_s=5.0 * share, best_goal=None)
-        outcome = mission.outcome(hovering(point), seen)
-        ends = outcome is None or isinstance(outcome, Outcome)
-        keep(ends, f"at {5.0 * share:g} s it answers {outcome!r}")
+    answer = mission.outcome(_on_the_way(world), _without_a_goal(world))
+    ends = answer is None or (answer[0] in range(20) and isinstance(answer[1], Outcome))
+    keep(ends, f"of 20 steps it answers {answer!r}")
+
+
+def ends_in_the_same_step_however_many_it_is_shown_at_once(make: Make) -> None:
+    """Between two ticks steps are shown together, beside a surface one by one."""
+    mission, world = _begun(make)
+    together = mission.outcome(_on_the_way(world), _without_a_goal(world))
+    mission, world = _begun(make)
+    way, alone = _on_the_way(world), None
+    for step in range(20):
+        one = Flown(*(values[step : step + 1] for values in way))
+        if alone is None and (answer := mission.outcome(one, _without_a_goal(world))) is not None:
+            alone = step, answer[1]
+    keep(together == alone, f"shown 20 steps at once it answers {together}, one by one {alone}")
 
 
 def names_who_chooses_the_goals(make: Make) -> None:
@@ -103,6 +131,6 @@ def writes_into_nothing_it_is_given(make: Make) -> None:
     """World, state and observation are the trial's own."""
     with untouched(world=building()):
         mission, world = _begun(make)
-    seen, here = _at_the_start(world), hovering(world.start_m)
-    with untouched(true_state=here, observation=seen):
+    seen, here = _at_the_start(world), _flown(world.start_m[None])
+    with untouched(flown=here, observation=seen):
         mission.outcome(here, seen)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import field
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numba as nb
 import numpy as np
@@ -23,6 +23,16 @@ from uavexp.parameters import NonNegative, Positive, above, at_most, option
 from uavexp.types import Command, Limits, Reference, State
 
 _LEAST_LIFT = 0.3  # share of gravity that is always lifted, so that body z stays up
+
+
+class Gains(NamedTuple):
+    """Parameters of the loop, as the kernel takes them."""
+
+    position_per_s: float
+    velocity_per_s: float
+    max_correction_mps: float
+    max_tilt_rad: float
+    drag_per_m: float
 
 
 @nb.njit(cache=True)
@@ -48,7 +58,7 @@ def _clip_norm(vector: Float, limit: float) -> None:
 
 
 @nb.njit(cache=True)
-def _command(
+def thrust_and_attitude(
     position_m: Float,
     velocity_mps: Float,
     q: Float,
@@ -56,21 +66,18 @@ def _command(
     reference_velocity_mps: Float,
     reference_acceleration_mps2: Float,
     yaw_rad: float,
-    position_gain: float,
-    velocity_gain: float,
-    max_correction_mps: float,
-    max_tilt_rad: float,
-    drag_per_m: float,
+    gains: Gains,
 ) -> tuple[float, Float]:
     """Specific thrust along body z, m/s², and wanted attitude (4,); see the module's equations."""
-    correction = position_gain * (reference_position_m - position_m)
-    _clip_norm(correction, max_correction_mps)
-    force = reference_acceleration_mps2 + velocity_gain * (reference_velocity_mps + correction - velocity_mps)
+    correction = gains.position_per_s * (reference_position_m - position_m)
+    _clip_norm(correction, gains.max_correction_mps)
+    wanted_mps = reference_velocity_mps + correction
+    force = reference_acceleration_mps2 + gains.velocity_per_s * (wanted_mps - velocity_mps)
     speed = math.sqrt(velocity_mps[0] ** 2 + velocity_mps[1] ** 2 + velocity_mps[2] ** 2)
-    force += drag_per_m * speed * velocity_mps
+    force += gains.drag_per_m * speed * velocity_mps
     force[2] = max(force[2] + GRAVITY_MPS2, _LEAST_LIFT * GRAVITY_MPS2)
     sideways = math.sqrt(force[0] * force[0] + force[1] * force[1])
-    most = force[2] * math.tan(max_tilt_rad)
+    most = force[2] * math.tan(gains.max_tilt_rad)
     if sideways > most:
         force[0] *= most / sideways
         force[1] *= most / sideways
@@ -98,9 +105,20 @@ class PositionVelocity:
         """Begin a trial of a vehicle of this mass."""
         self._mass_kg = mass_kg
 
+    @property
+    def gains(self) -> Gains:
+        """Parameters of the loop for the vehicle of this trial."""
+        return Gains(
+            position_per_s=self.position_gain_per_s,
+            velocity_per_s=self.velocity_gain_per_s,
+            max_correction_mps=self.max_correction_mps,
+            max_tilt_rad=self.max_tilt_rad,
+            drag_per_m=self.drag_kgpm / self._mass_kg,
+        )
+
     def command(self, estimated_state: State, reference: Reference) -> Command:
         """Return thrust and attitude that lead the state to the reference."""
-        thrust, attitude = _command(
+        thrust, attitude = thrust_and_attitude(
             estimated_state.position_m,
             estimated_state.velocity_mps,
             estimated_state.quaternion_wxyz,
@@ -108,11 +126,7 @@ class PositionVelocity:
             reference.velocity_mps,
             reference.acceleration_mps2,
             float(reference.yaw_rad),
-            self.position_gain_per_s,
-            self.velocity_gain_per_s,
-            self.max_correction_mps,
-            self.max_tilt_rad,
-            self.drag_kgpm / self._mass_kg,
+            self.gains,
         )
         return Command(
             thrust_N=self._mass_kg * thrust,

@@ -6,6 +6,7 @@ import numpy as np
 
 from uavexp.estimator.base import Believe
 from uavexp.parameters import option
+from uavexp.types import State
 
 
 @option(frozen=True)
@@ -14,4 +15,9 @@ class Perfect:
 
     def begin(self, rng: np.random.Generator) -> Believe:
         """Begin a trial; nothing is drawn."""
-        return lambda true_state, step_s: true_state
+        return truth
+
+
+def truth(true_state: State, step_s: float) -> State:
+    """The true state."""
+    return true_state

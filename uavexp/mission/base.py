@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -10,7 +10,15 @@ from uavexp.arrays import Float
 from uavexp.explorer.base import Explorer
 from uavexp.log import Inspection
 from uavexp.scene import Scene
-from uavexp.types import Limits, Observation, Outcome, State, World
+from uavexp.types import Limits, Observation, Outcome, World
+
+
+class Flown(NamedTuple):
+    """Steps of a flight, in truth."""
+
+    time_s: Float  # (N,)
+    position_m: Float  # (N, 3)
+    quaternion_wxyz: Float  # (N, 4)
 
 
 class Mission(Protocol):
@@ -33,8 +41,11 @@ class Mission(Protocol):
     def time_limit_s(self) -> float:
         """Flight time after which the mission has timed out."""
 
-    def outcome(self, true_state: State, observation: Observation) -> Outcome | None:
-        """How the flight ended, or None while it goes on; asked at every step."""
+    def outcome(self, flown: Flown, observation: Observation) -> tuple[int, Outcome] | None:
+        """At which of these steps the flight has ended, and how; None: it goes on.
+
+        Every step is shown once, in order; none after the end counts. The observation is the latest.
+        """
 
     def findings(self) -> Inspection:
         """What only this mission knows of the flight; nothing for most."""

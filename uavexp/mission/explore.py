@@ -10,9 +10,10 @@ from uavexp.arrays import Float
 from uavexp.errors import require
 from uavexp.explorer.base import Explorer
 from uavexp.log import Inspection
+from uavexp.mission.base import Flown
 from uavexp.parameters import NonNegative, Positive, option
 from uavexp.scene import Scene
-from uavexp.types import Limits, Observation, Outcome, State, World
+from uavexp.types import Limits, Observation, Outcome, World
 
 
 @option
@@ -57,8 +58,9 @@ class Explore:
         """Base time plus a time for each square metre of floor."""
         return self._time_limit_s
 
-    def outcome(self, true_state: State, observation: Observation) -> Outcome | None:
+    def outcome(self, flown: Flown, observation: Observation) -> tuple[int, Outcome] | None:
         """EXPLORED when no frontier has been reachable for `patience_s`."""
         if observation.best_goal is not None:
-            self._last_goal_s = observation.time_s
-        return Outcome.EXPLORED if observation.time_s - self._last_goal_s >= self.patience_s else None
+            self._last_goal_s = float(flown.time_s[-1])
+        is_over = flown.time_s - self._last_goal_s >= self.patience_s
+        return (int(is_over.argmax()), Outcome.EXPLORED) if is_over.any() else None

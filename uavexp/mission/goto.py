@@ -9,9 +9,10 @@ import numpy as np
 from uavexp.arrays import Float
 from uavexp.explorer.base import Explorer
 from uavexp.log import Inspection
+from uavexp.mission.base import Flown
 from uavexp.parameters import NonNegative, Positive, option
 from uavexp.scene import Scene
-from uavexp.types import Limits, Observation, Outcome, State, World
+from uavexp.types import Limits, Observation, Outcome, World
 
 
 @option
@@ -49,10 +50,10 @@ class Goto:
         """Base time plus a time for each metre of the true shortest path."""
         return self.time_base_s + self.time_per_path_spm * self._task().difficulty.shortest_path_m
 
-    def outcome(self, true_state: State, observation: Observation) -> Outcome | None:
+    def outcome(self, flown: Flown, observation: Observation) -> tuple[int, Outcome] | None:
         """REACHED within the tolerance of the target."""
-        distance_m = np.linalg.norm(true_state.position_m - self._task().target_m)
-        return Outcome.REACHED if distance_m <= self.tolerance_m else None
+        is_there = np.linalg.norm(flown.position_m - self._task().target_m, axis=1) <= self.tolerance_m
+        return (int(is_there.argmax()), Outcome.REACHED) if is_there.any() else None
 
     def _task(self) -> World:
         if self._world is None:

@@ -26,11 +26,12 @@ from uavexp.inspection.viewpoints import Pattern
 from uavexp.inspection.visibility import Camera
 from uavexp.log import Inspection
 from uavexp.mission import unforeseen
+from uavexp.mission.base import Flown
 from uavexp.mission.cells_seen import Coverage, reachable_m, visible_anywhere
 from uavexp.mission.tour_guide import Look, TourGuide
 from uavexp.parameters import Count, NonNegative, Positive, Range, Share, between, option
 from uavexp.scene import Scene
-from uavexp.types import Limits, Observation, Outcome, ReferenceMap, State, World
+from uavexp.types import Limits, Observation, Outcome, ReferenceMap, World
 
 LOOK_S = 0.2  # between the instants at which the camera earns coverage
 
@@ -203,14 +204,16 @@ class Inspect:
         """Base time plus a time for each viewpoint and for each metre of the tour."""
         return self._time_limit_s
 
-    def outcome(self, true_state: State, observation: Observation) -> Outcome | None:
+    def outcome(self, flown: Flown, observation: Observation) -> tuple[int, Outcome] | None:
         """INSPECTED when no viewpoint is left; counts what the camera sees on the way."""
-        if observation.time_s >= self._next_look_s - 1e-9:
-            self._next_look_s += LOOK_S
-            yaw_rad = yaw_of(true_state.quaternion_wxyz)
-            for coverage in (self._coverage, self._true_coverage):
-                coverage.look(self._scene, observation.time_s, true_state.position_m, yaw_rad)
-        return Outcome.INSPECTED if self._begun().finished else None
+        is_over = self._begun().finished
+        for k, time_s in enumerate(flown.time_s[:1] if is_over else flown.time_s):
+            if time_s >= self._next_look_s - 1e-9:
+                self._next_look_s += LOOK_S
+                yaw_rad = yaw_of(flown.quaternion_wxyz[k])
+                for coverage in (self._coverage, self._true_coverage):
+                    coverage.look(self._scene, float(time_s), flown.position_m[k], yaw_rad)
+        return (0, Outcome.INSPECTED) if is_over else None
 
     def findings(self) -> Inspection:
         """Cells and when they were seen, viewpoints and when they were visited."""

@@ -5,12 +5,30 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numba as nb
+
 from uavexp.arrays import Float
 from uavexp.geometry import wrap_angle
-from uavexp.types import Goal
 
 _AHEAD_M = 0.1  # a shorter way ahead has no direction
 _GAIN_PER_S = 4.0  # from yaw error to yaw rate
+
+
+@nb.njit(cache=True)
+def bearing_rad(wanted_rad: float, ahead_m: Float) -> float:
+    """Where to look: as wanted (NaN: no wish), else along the way to come (3,); NaN: as before."""
+    if not math.isnan(wanted_rad):
+        return wanted_rad
+    if math.hypot(ahead_m[0], ahead_m[1]) < _AHEAD_M:
+        return math.nan
+    return math.atan2(ahead_m[1], ahead_m[0])
+
+
+@nb.njit(cache=True)
+def rate_to(bearing_rad: float, yaw_rad: float, most_radps: float) -> float:
+    """How fast to turn towards a bearing, rad/s."""
+    rate_radps = _GAIN_PER_S * wrap_angle(bearing_rad - yaw_rad)
+    return float(min(max(rate_radps, -most_radps), most_radps))
 
 
 @dataclass(slots=True, kw_only=True)
@@ -19,13 +37,6 @@ class Heading:
 
     yaw_rad: float
     most_radps: float
-
-    def turn_to(self, bearing_rad: float, step_s: float) -> float:
-        """Turn towards a bearing (NaN: stay) for one step; returns the rate, rad/s."""
-        if math.isnan(bearing_rad):
-            return 0.0
-        rate_radps = _GAIN_PER_S * float(wrap_angle(bearing_rad - self.yaw_rad))
-        return self.turn(min(max(rate_radps, -self.most_radps), self.most_radps), step_s)
 
     def turn(self, rate_radps: float, step_s: float) -> float:
         """Turn at this rate for one step; returns the rate."""
@@ -36,17 +47,3 @@ class Heading:
         """Time to turn until the yaw is within an angle of a bearing, s."""
         error_rad = abs(float(wrap_angle(bearing_rad - self.yaw_rad)))
         return max(0.0, error_rad - within_rad) / self.most_radps
-
-
-def bearing_rad(goal: Goal | None, ahead_m: Float) -> float:
-    """Where to look: as the goal asks, else along the path ahead; NaN: as before.
-
-    Args:
-        goal: g*, if there is one.
-        ahead_m: (3,) the way to come.
-    """
-    if goal is not None and math.isfinite(goal.yaw_rad):
-        return goal.yaw_rad
-    if math.hypot(ahead_m[0], ahead_m[1]) < _AHEAD_M:
-        return math.nan
-    return math.atan2(ahead_m[1], ahead_m[0])

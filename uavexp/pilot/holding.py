@@ -20,6 +20,7 @@ from uavexp.braking import REST_MPS, braking_trajectory, with_stop
 from uavexp.log import Replan
 from uavexp.parameters import Count, NonNegative, option
 from uavexp.pilot.base import Crew
+from uavexp.pilot.following import follow, row_of
 from uavexp.pilot.heading import Heading, bearing_rad
 from uavexp.pilot.noting import replan_of
 from uavexp.trajectory import Trajectory, derivative, evaluate, hover_before
@@ -93,20 +94,23 @@ class HoldingPilot:
             return self._look_around(step_s)
         if self.trajectory is None:
             return self._hold(self.crew.start_m)
-        # A plan may be adopted a rounding before it starts, where it would stand still.
-        now_s = max(time_s, self.trajectory.start_s)
-        ahead_s = max(now_s, self._moves_s) + self.rules.yaw_lookahead_s
-        ahead_s = min(ahead_s, max(now_s, self.trajectory.end_s))
-        position, velocity, acceleration = evaluate(self.trajectory, np.array([now_s, ahead_s]))
-        rate_radps = self.heading.turn_to(bearing_rad(self.best_goal, position[1] - position[0]), step_s)
+        row = self._follow(self.trajectory, np.array([time_s]), step_s)[0]
         return Reference(
-            position_m=position[0],
-            velocity_mps=velocity[0],
-            acceleration_mps2=acceleration[0],
-            yaw_rad=self.heading.yaw_rad,
-            yaw_rate_radps=rate_radps,
-            jerk_mps3=derivative(self.trajectory, np.array([now_s]), 3)[0],
+            position_m=row[0:3],
+            velocity_mps=row[3:6],
+            acceleration_mps2=row[6:9],
+            yaw_rad=float(row[9]),
+            yaw_rate_radps=float(row[10]),
+            jerk_mps3=derivative(self.trajectory, np.array([max(time_s, self.trajectory.start_s)]), 3)[0],
         )
+
+    def references(self, times_s: Float, step_s: float) -> Float:
+        """`reference` of one step to come after the other, as rows (N, 11) of `following`."""
+        pending = self._pending
+        adopts = pending is not None and times_s[-1] >= pending.trajectory.start_s - 1e-9
+        if self.trajectory is None or self.failure or adopts:
+            return np.array([row_of(self.reference(time_s, step_s)) for time_s in times_s.tolist()])
+        return self._follow(self.trajectory, times_s, step_s)
 
     def explore(self, observation: Observation) -> None:
         """Update g*; while without a valid plan, try again."""
@@ -187,6 +191,19 @@ class HoldingPilot:
             tracks=observation.tracks,
         )
 
+    def _follow(self, trajectory: Trajectory, times_s: Float, step_s: float) -> Float:
+        rows: Float = follow(
+            trajectory.breaks_s, trajectory.coefficients, times_s, self._moves_s, self.rules.yaw_lookahead_s,
+            self._wanted_rad, self.heading.yaw_rad, self.heading.most_radps, step_s,
+        )  # fmt: skip
+        self.heading.yaw_rad = float(rows[-1, 9])
+        return rows
+
+    @property
+    def _wanted_rad(self) -> float:
+        """The yaw that g* asks for; NaN: none."""
+        return math.nan if self.best_goal is None else self.best_goal.yaw_rad
+
     def _planned_state(self, time_s: float) -> tuple[Float, Float, Float]:
         if self.trajectory is None:
             return self.crew.start_m, np.zeros(3), np.zeros(3)
@@ -207,7 +224,7 @@ class HoldingPilot:
         """
         times_s = trajectory.start_s + np.array([0.0, self.rules.yaw_lookahead_s])
         position, velocity, _ = evaluate(trajectory, times_s)
-        bearing = bearing_rad(self.best_goal, position[1] - position[0])
+        bearing = bearing_rad(self._wanted_rad, position[1] - position[0])
         if float(np.linalg.norm(velocity[0])) > REST_MPS or math.isnan(bearing):
             return 0.0
         return self.heading.turning_s(bearing, self.rules.turn_first_rad)

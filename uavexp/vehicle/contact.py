@@ -92,7 +92,7 @@ class ContactTracker:
     body_size_m: tuple[float, float, float]
     release_gap_m: float = 0.02
     release_time_s: float = 0.2
-    _measured_at_m: Float = field(init=False, repr=False)
+    _measured_at_m: Float = field(init=False, repr=False, default_factory=lambda: np.zeros(3))
     _clearance_m: float = field(init=False, repr=False, default=-1.0)
     _movers: Bodies = field(init=False, repr=False, default_factory=Bodies.none)  # a step ago
     _open: dict[int, Contact] = field(init=False, repr=False, default_factory=dict)
@@ -119,6 +119,15 @@ class ContactTracker:
         """All contacts so far, those still open included."""
         return (*self._closed, *self._open.values())
 
+    @property
+    def free_ball(self) -> tuple[Float, float]:
+        """Centre (3,) and radius of a ball in which the body, wherever its centre, meets no fixed surface."""
+        return self._measured_at_m, -1.0 if self._open else self._clearance_m - self._reach_m
+
+    @property
+    def _reach_m(self) -> float:
+        return 0.5 * float(np.linalg.norm(self.body_size_m))
+
     def _moved_m(self) -> Float:
         """How far each mover has come since the last step (B, 3); 0 for one that appears or leaves."""
         now, then = self.scene.bodies.position_m, self._movers.position_m
@@ -139,16 +148,15 @@ class ContactTracker:
 
     def _is_far(self, before: State, after: State, moved_m: Float) -> bool:
         """Whether no part of the box can meet a surface or a mover on the way."""
-        reach = 0.5 * float(np.linalg.norm(self.body_size_m))
+        travel_m = float(np.linalg.norm(after.position_m - before.position_m))
         if len(moved_m):
-            way_m = float(np.linalg.norm(after.position_m - before.position_m)) + float(np.abs(moved_m).sum())
-            if distance_m(self.scene.bodies, after.position_m[None])[0] <= reach + way_m:
+            way_m = travel_m + float(np.abs(moved_m).sum())
+            if distance_m(self.scene.bodies, after.position_m[None])[0] <= self._reach_m + way_m:
                 return False
-        if self._clearance_m > reach:
-            gone = after.position_m - self._measured_at_m
-            if self._clearance_m - float(np.sqrt(gone @ gone)) > reach:
-                return True
+        centre_m, radius_m = self.free_ball
+        gone_m = after.position_m - centre_m
+        if float(np.sqrt(gone_m @ gone_m)) < radius_m:
+            return True
         self._measured_at_m = after.position_m
         self._clearance_m = float(self.scene.fixed_distance_m(after.position_m[None])[0])
-        travel = float(np.linalg.norm(after.position_m - before.position_m))
-        return self._clearance_m - travel > reach
+        return travel_m < self.free_ball[1]

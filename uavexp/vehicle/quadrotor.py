@@ -183,7 +183,7 @@ def mix(thrust_N: float, moment_Nm: Float, plant: Plant, rotor_command_radps: Fl
 
 
 @nb.njit(cache=True)
-def _advance(
+def advance(
     x: Float, command: Float, plant: Plant, loop: AttitudeLoop, step_s: float, substeps: int, work: Float
 ) -> None:
     """Advance `x` in place by `substeps` of attitude loop, mixer and RK4; command = [T, q, rate]."""
@@ -198,6 +198,14 @@ def _advance(
         moment[2] = jz * loop.yaw_rate_gain_per_s * (rate[2] - wz) + (jy - jx) * wx * wy
         mix(command[0], moment, plant, rotors)
         integrate(x, rotors, plant, step_s / substeps, work)
+
+
+def state_of(x: Float) -> State:
+    """The state in a 17-vector, copied."""
+    x = x.copy()
+    return State(
+        position_m=x[_P:_V], velocity_mps=x[_V:_Q], quaternion_wxyz=x[_Q:_W], body_rate_radps=x[_W:_ROTOR]
+    )
 
 
 @option
@@ -268,6 +276,16 @@ class Quadrotor(Body):
         return self._plant
 
     @property
+    def loop(self) -> AttitudeLoop:
+        """Gains of the inner loop."""
+        return self._loop
+
+    @property
+    def x(self) -> Float:
+        """The 17-vector of the kernels itself, which they advance."""
+        return self._x
+
+    @property
     def rotor_speed_radps(self) -> Float:
         """Rotor speeds (4,), rad/s."""
         return self._x[_ROTOR:].copy()
@@ -286,11 +304,8 @@ class Quadrotor(Body):
         packed[0] = command.thrust_N
         packed[1:5] = command.quaternion_wxyz
         packed[5:8] = command.body_rate_radps
-        _advance(self._x, packed, self._plant, self._loop, step_s, self.substeps, self._work)
-        x = self._x.copy()
-        return State(
-            position_m=x[_P:_V], velocity_mps=x[_V:_Q], quaternion_wxyz=x[_Q:_W], body_rate_radps=x[_W:_ROTOR]
-        )
+        advance(self._x, packed, self._plant, self._loop, step_s, self.substeps, self._work)
+        return state_of(self._x)
 
     def place(self, state: State) -> None:
         """Overwrite position, velocity, attitude and rate; the rotors keep their speed."""

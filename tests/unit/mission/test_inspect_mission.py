@@ -18,6 +18,7 @@ from uavexp.field import OCCUPIED, DistanceField
 from uavexp.geometry import quaternion_from_yaw
 from uavexp.inspection.inspection_plan import nearest_order
 from uavexp.inspection.travel import travel_matrix
+from uavexp.mission.base import Flown
 from uavexp.mission.inspect import Inspect
 from uavexp.mission.tour_guide import TourGuide
 from uavexp.scene import Scene
@@ -54,6 +55,14 @@ def state(position_m: np.ndarray, yaw_rad: float = 0.0) -> State:
         velocity_mps=np.zeros(3),
         quaternion_wxyz=quaternion_from_yaw(yaw_rad),
         body_rate_radps=np.zeros(3),
+    )
+
+
+def flown(*times_s: float) -> Flown:
+    """On the spot, at the start."""
+    count = len(times_s)
+    return Flown(
+        np.array(times_s), np.tile(START_M, (count, 1)), np.tile(quaternion_from_yaw(0.0), (count, 1))
     )
 
 
@@ -143,9 +152,9 @@ def test_viewpoints_that_the_live_map_blocks_are_left_out() -> None:
 
 def test_the_mission_ends_with_the_visit_and_reports_what_was_seen() -> None:
     mission, guide = begun()
-    assert mission.outcome(state(START_M), seen_at(0.0, state(START_M))) is None
+    assert mission.outcome(flown(0.0, 0.1), seen_at(0.0, state(START_M))) is None
     visit(guide)
-    assert mission.outcome(state(START_M), seen_at(9.0, state(START_M))) is Outcome.INSPECTED
+    assert mission.outcome(flown(9.0, 9.1), seen_at(9.0, state(START_M))) == (0, Outcome.INSPECTED)
     findings = mission.findings()
     assert np.isfinite(findings.cell_seen_s).any()
     assert findings.cell_visible[np.isfinite(findings.cell_seen_s)].all()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 from tests.unit.trigger.test_trigger import LIMITS, change, goal_at, observe, room
 from uavexp.field import DistanceField
+from uavexp.mission.base import Flown
 from uavexp.mission.explore import Explore
 from uavexp.mission.goto import Goto
 from uavexp.recorder import Recorder, seen_share
@@ -28,22 +30,18 @@ def at(time_s: float, *, goal: bool = True) -> Observation:
     return observe(field, change(field, field), time_s=time_s, best=goal_at(1.0) if goal else None)
 
 
-def hover(position_m: np.ndarray) -> State:
-    zero = np.zeros(3)
-    return State(
-        position_m=position_m,
-        velocity_mps=zero,
-        quaternion_wxyz=np.array([1.0, 0.0, 0.0, 0.0]),
-        body_rate_radps=zero,
-    )
+def flown(times_s: Sequence[float], position_m: Sequence[np.ndarray] | np.ndarray) -> Flown:
+    upright = np.tile([1.0, 0.0, 0.0, 0.0], (len(times_s), 1))
+    return Flown(np.array(times_s), np.array(position_m), upright)
 
 
 def test_reached_is_within_the_tolerance_in_truth(hall: World) -> None:
     mission = Goto(tolerance_m=0.3)
     mission.reset(hall, Scene(hall), LIMITS)
     direction = np.array([0.6, 0.0, 0.8])
-    assert mission.outcome(hover(hall.target_m + 0.299 * direction), at(1.0)) is Outcome.REACHED
-    assert mission.outcome(hover(hall.target_m + 0.301 * direction), at(1.0)) is None
+    places_m = hall.target_m + np.array([[0.302], [0.301], [0.299], [0.1]]) * direction
+    assert mission.outcome(flown([1.0, 1.01, 1.02, 1.03], places_m), at(1.0)) == (2, Outcome.REACHED)
+    assert mission.outcome(flown([1.0, 1.01], places_m[:2]), at(1.0)) is None
     assert mission.time_limit_s == pytest.approx(60.0 + 5.0 * hall.difficulty.shortest_path_m)
 
 
@@ -52,13 +50,17 @@ def test_explored_is_no_goal_for_the_patience(hall: World) -> None:
     mission.reset(hall, Scene(hall), LIMITS)
     assert mission.target_m is None
     position = hall.start_m
-    answers = [mission.outcome(hover(position), at(t, goal=t < 3.0)) for t in np.arange(0.0, 6.0, 0.1)]
-    first = next(n for n, answer in enumerate(answers) if answer is Outcome.EXPLORED)
-    assert first * 0.1 == pytest.approx(2.9 + 2.0, abs=0.11)
+    for begin_s in np.arange(0.0, 4.6, 0.2):
+        two_s = [begin_s, begin_s + 0.1]
+        assert mission.outcome(flown(two_s, [position] * 2), at(begin_s, goal=begin_s < 3.0)) is None
+    assert mission.outcome(flown([4.6, 4.8, 4.95, 5.0], [position] * 4), at(4.6, goal=False)) == (
+        2,
+        Outcome.EXPLORED,
+    )
 
 
 def test_standing_still_is_measured_over_the_whole_window() -> None:
-    recorder = Recorder()
+    recorder = Recorder(1001, 0.01)
     zero = np.zeros(3)
     reference = Reference(position_m=zero, velocity_mps=zero, acceleration_mps2=zero, yaw_rad=0.0)
     state = State(
@@ -66,11 +68,12 @@ def test_standing_still_is_measured_over_the_whole_window() -> None:
     )
     for step in range(1001):
         moved = replace(state, position_m=np.array([min(step, 500) * 0.01, 0.0, 0.0]))
-        recorder.step(step * 0.01, moved, moved, reference, Bodies.none())
+        recorder.step(step, moved, moved, reference, Bodies.none())
         if step < 400:
-            assert math.isinf(recorder.moved_m(400))
-    assert recorder.moved_m(400) == 0.0
-    assert recorder.moved_m(700) == pytest.approx(2.0)
+            assert math.isinf(recorder.moved_m(step, 400))
+    assert recorder.moved_m(1000, 400) == 0.0
+    assert recorder.moved_m(1000, 700) == pytest.approx(2.0)
+    assert recorder.moved_m(500, 400) == pytest.approx(4.0)
 
 
 @pytest.mark.parametrize(("seen", "share"), [(0, 0.0), (1, 1.0)])

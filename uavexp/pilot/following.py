@@ -1,0 +1,65 @@
+"""References along a trajectory, for as many steps as are asked for at once.
+
+A row (11,) is what the controller is asked to follow in one step: position, velocity, acceleration, yaw
+and yaw rate.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numba as nb
+import numpy as np
+
+from uavexp.arrays import Float
+from uavexp.geometry import wrap_angle
+from uavexp.pilot.heading import bearing_rad, rate_to
+from uavexp.trajectory import evaluate_pieces
+from uavexp.types import Reference
+
+
+@nb.njit(cache=True)
+def follow(
+    breaks_s: Float,
+    coefficients: Float,
+    times_s: Float,
+    moves_s: float,
+    lookahead_s: float,
+    wanted_rad: float,
+    yaw_rad: float,
+    most_radps: float,
+    step_s: float,
+) -> Float:
+    """Rows (N, 11) of the steps at times (N,), the yaw turning from step to step.
+
+    Args:
+        breaks_s: of the `Trajectory`.
+        coefficients: of the same.
+        times_s: (N,) a step apart, increasing.
+        moves_s: before, the trajectory only turns: what lies ahead begins there.
+        lookahead_s: how far ahead the yaw looks.
+        wanted_rad: the yaw that the goal asks for; NaN: none.
+        yaw_rad: before the first step.
+        most_radps: fastest turn.
+        step_s: of a step.
+    """
+    # A plan may be adopted a rounding before it starts, where it would stand still.
+    now_s = np.maximum(times_s, breaks_s[0])
+    ahead_s = np.minimum(np.maximum(now_s, moves_s) + lookahead_s, np.maximum(now_s, breaks_s[-1]))
+    position, velocity, acceleration = evaluate_pieces(breaks_s, coefficients, now_s)
+    ahead = evaluate_pieces(breaks_s, coefficients, ahead_s)[0] - position
+    rows = np.zeros((len(times_s), 11))
+    rows[:, 0:3], rows[:, 3:6], rows[:, 6:9] = position, velocity, acceleration
+    for n in range(len(times_s)):
+        bearing = bearing_rad(wanted_rad, ahead[n])
+        if not math.isnan(bearing):
+            rows[n, 10] = rate_to(bearing, yaw_rad, most_radps)
+            yaw_rad = wrap_angle(yaw_rad + rows[n, 10] * step_s)
+        rows[n, 9] = yaw_rad
+    return rows
+
+
+def row_of(reference: Reference) -> Float:
+    """The row (11,) of a reference."""
+    turn = (reference.yaw_rad, reference.yaw_rate_radps)
+    return np.concatenate([reference.position_m, reference.velocity_mps, reference.acceleration_mps2, turn])
