@@ -27,7 +27,7 @@ class Scene:
         world: its `vertices_m` and `triangles`; none at all means empty space.
     """
 
-    __slots__ = ("_grid", "_raycasting", "_triangles", "_vertices", "bodies")
+    __slots__ = ("_grid", "_raycasting", "bodies", "triangles", "vertices_m")
 
     def __init__(self, world: World) -> None:
         self._build(world.vertices_m, world.triangles)
@@ -40,15 +40,15 @@ class Scene:
         return scene
 
     def _build(self, vertices_m: Float32, triangles: Int32) -> None:
-        self._vertices = np.ascontiguousarray(vertices_m, dtype=np.float32)
-        self._triangles = np.ascontiguousarray(triangles, dtype=np.int32)
+        self.vertices_m = np.ascontiguousarray(vertices_m, dtype=np.float32)
+        self.triangles = np.ascontiguousarray(triangles, dtype=np.int32)
         self._grid: triangle_grid.TriangleGrid | None = None
         self._raycasting = None
         self.bodies = Bodies.none()
-        if self._triangles.shape[0] > 0:
+        if self.triangles.shape[0] > 0:
             self._raycasting = open3d.t.geometry.RaycastingScene(nthreads=_THREADS)
             self._raycasting.add_triangles(
-                open3d.core.Tensor(self._vertices), open3d.core.Tensor(self._triangles.astype(np.uint32))
+                open3d.core.Tensor(self.vertices_m), open3d.core.Tensor(self.triangles.astype(np.uint32))
             )
 
     def place(self, bodies: Bodies) -> None:
@@ -73,10 +73,15 @@ class Scene:
     def fixed_cast(self, rays: Float32) -> tuple[Float32, Float32]:
         """The same with fixed surfaces alone."""
         if self._raycasting is None:
-            count = rays.shape[0]
-            return np.full(count, np.inf, dtype=np.float32), np.zeros((count, 3), dtype=np.float32)
+            return _nothing_met(len(rays))
         hits = self._raycasting.cast_rays(_tensor(rays), nthreads=_THREADS)
         return hits["t_hit"].numpy(), hits["primitive_normals"].numpy()
+
+    def cast_movers(self, rays: Float32) -> tuple[Float32, Float32]:
+        """The same with movers alone."""
+        hit, normal = _nothing_met(len(rays))
+        cast_rays(self.bodies, rays, hit, normal)
+        return hit, normal
 
     def distance_m(self, points_m: Float) -> Float:
         """Unsigned distance (N,) of points (N, 3) to the nearest surface or mover, m; inf in empty space."""
@@ -128,8 +133,13 @@ class Scene:
     def grid(self) -> triangle_grid.TriangleGrid:
         """The triangles (at least one) sorted into cells, for numba kernels; built at first use."""
         if self._grid is None:
-            self._grid = triangle_grid.build(self._vertices, self._triangles)
+            self._grid = triangle_grid.build(self.vertices_m, self.triangles)
         return self._grid
+
+
+def _nothing_met(count: int) -> tuple[Float32, Float32]:
+    """The answer of so many rays into empty space."""
+    return np.full(count, np.inf, np.float32), np.zeros((count, 3), np.float32)
 
 
 def _tensor(array: Float | Float32) -> object:

@@ -128,16 +128,20 @@ def test_quantised_depths_have_whole_disparity_steps():
     assert (np.abs(scan.depth_m[both] - exact[both]) < 1.05 * half_step + 1e-5).all()
 
 
-def test_returns_are_missing_at_depth_edges_and_nowhere_else():
-    scene = scene_of(((4, -50, -50), (4.5, 50, 50)), ((2, -0.4, -50), (2.2, 0.4, 50)))
+@pytest.mark.parametrize("beam", [((2, -0.4, -50), (2.2, 0.4, 50)), ((2, -50, -0.4), (2.2, 50, 0.4))])
+def test_returns_are_missing_at_depth_edges_and_nowhere_else(beam):
+    scene = scene_of(((4, -50, -50), (4.5, 50, 50)), beam)
     exact = scan_of(scene, **QUIET).depth_m
     depth = scan_of(scene, **(QUIET | {"edge_missing": True, "edge_missing_probability": 1.0})).depth_m
-    column = np.isnan(depth).all(axis=0)
-    np.testing.assert_array_equal(np.isnan(depth), np.tile(column, (72, 1)))
-    jump = np.abs(np.diff(exact[0])) > 1.0  # between columns u and u + 1
-    np.testing.assert_array_equal(column, np.append(jump, False) | np.append(False, jump))
+    edge = np.zeros(exact.shape, bool)
+    for axis in (0, 1):
+        near = np.moveaxis(edge, axis, 0)
+        jump = np.abs(np.diff(np.moveaxis(exact, axis, 0), axis=0)) > 1.0  # between neighbours
+        near[:-1] |= jump
+        near[1:] |= jump
+    np.testing.assert_array_equal(np.isnan(depth), edge)
     half = scan_of(scene, **(QUIET | {"edge_missing": True, "edge_missing_probability": 0.5})).depth_m
-    assert np.isnan(half[:, column]).mean() == pytest.approx(0.5, abs=0.1)
+    assert np.isnan(half[edge]).mean() == pytest.approx(0.5, abs=0.1)
 
 
 def test_a_floor_is_no_edge_however_steep():
@@ -164,7 +168,9 @@ def test_beyond_range_is_inf_and_too_near_is_nan():
     assert np.isposinf(scan_of(wall(5.5)).depth_m).all()
     assert np.isposinf(scan_of(wall(-9.0)).depth_m).all()  # nothing in view
     assert np.isnan(scan_of(wall(0.15)).depth_m).all()
-    assert np.isnan(scan_of(wall(0.0), min_range_m=0.0, **QUIET).depth_m).all()  # camera on the surface
+    assert (scan_of(wall(1e-6), min_range_m=0.0, **QUIET).depth_m < 2e-6).all()  # all but on the surface
+    # what holds the camera is seen edge-on, that is not at all; its other side is
+    assert (scan_of(wall(0.0), min_range_m=0.0, **QUIET).depth_m == 1.0).all()
 
 
 def test_same_seed_same_image_and_switches_do_not_shift_the_stream():
