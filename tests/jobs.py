@@ -51,6 +51,17 @@ def _hog_a_little(_: Any) -> None:
     assert np.empty((64, 1024, 1024)).nbytes > 5e8  # address space, not touched
 
 
+_KEPT: list[Any] = []
+
+
+def _grow(_: Any) -> None:
+    _KEPT.append(np.empty((64, 1024, 1024)))  # half a GB of address space, held for good
+
+
+def _print_frame(_: Any) -> None:
+    os.write(2, b'  File "/somewhere/printed.py", line 7 in long_ago\n')
+
+
 def _note_and_sleep(folder: Path) -> None:
     _note(folder)
     time.sleep(60.0)
@@ -99,6 +110,9 @@ DEEDS = {
     "leave": _leave,
     "print": _print,
     "hog_a_little": _hog_a_little,
+    "note": _note,
+    "grow": _grow,
+    "print_frame": _print_frame,
     "note_and_sleep": _note_and_sleep,
     "note_and_spin": _note_and_spin,
 }

@@ -10,6 +10,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -17,10 +18,17 @@ import pytest
 
 from tests.sweeps import QUICK, assert_same_study, begin, records, run
 from uavexp.__main__ import main
+from uavexp.config.composition import Composer
+from uavexp.config.overrides import parse_settings
 from uavexp.paths import PACKAGE
 from uavexp.store.history import commit
-from uavexp.store.records import canonical_json, digest, read_record, seal
+from uavexp.store.records import Status, canonical_json, digest, read_record, seal
 from uavexp.store.study import collect, read_runs, read_study
+from uavexp.sweep.agenda import agenda_of
+from uavexp.sweep.head_start import PRELOAD
+from uavexp.sweep.job import Allowance
+from uavexp.sweep.local import run_local, start_fork_server
+from uavexp.sweep.trial_job import fly_job
 
 STUDY = (*QUICK, "strategy=mcr,tbr", "seed=0:3")
 FAULTY = ("--config-dir", str(PACKAGE.parent / "tests" / "faulty"))
@@ -256,6 +264,27 @@ def test_an_interrupted_sweep_says_how_to_go_on(tmp_path: Path) -> None:
     assert main([*STUDY, f"out={folder}"]) == 0
     assert [entry["ended"] for entry in read_runs(folder)] == ["interrupted", "finished"]
     assert {entry["commit"] for entry in read_runs(folder)} == {commit()}
+
+
+def test_a_child_that_has_flown_leaves_the_bytes_of_a_fresh_one(tmp_path: Path) -> None:
+    """What a process keeps from one flight to the next must show in none; last comes the first again."""
+    others = (
+        "strategy=tbr mapping=voxel_block_grid", "strategy=mcr_literal planner=bspline_mpc",
+        "planner=df_bitstar sensor=lidar_rosette", "movers=mixed movers.count=3 detection=noisy",
+        "planner=rrtstar estimator=drift safety=brake",
+    )  # fmt: skip
+    commands = [Composer().command(parse_settings([*QUICK, *typed.split(), "seed=0"])) for typed in others]
+    first, *rest = [agenda_of(command, tmp_path).jobs[0] for command in commands]
+    given = [first, *rest, replace(first, name="again")]
+    start_fork_server([PRELOAD])
+    limits = Allowance(timeout_s=300.0, memory_mb=4000.0)
+    reused = list(run_local(fly_job, given, n_jobs=1, limits=limits))
+    fresh = [next(run_local(fly_job, [job], n_jobs=1, limits=limits)) for job in given[:-1]]
+    for ours, theirs in zip(reused, [*fresh, fresh[0]], strict=True):
+        assert ours.answer.status is Status.OK, ours.answer.reason
+        assert ours.answer.value.world == theirs.answer.value.world
+        files = [{**done.answer.value.files, "wall.json": b""} for done in (ours, theirs)]
+        assert files[0] == files[1], ours.job.payload.command
 
 
 @contextlib.contextmanager

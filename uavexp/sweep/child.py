@@ -1,9 +1,10 @@
-"""The child's side: one call in a process that cannot outlive its supervisor."""
+"""The child's side: one call after another in a process that cannot outlive its supervisor."""
 
 from __future__ import annotations
 
 import ctypes
 import faulthandler
+import gc
 import multiprocessing
 import os
 import pickle
@@ -22,33 +23,46 @@ from uavexp.sweep.job import Answer, Call
 
 _PR_SET_PDEATHSIG = 1
 _SIZE = Path("/proc/self/statm")
+_MOST_CALLS = 30  # of one child: so many share what a fresh one costs
+_GROWTH_MB = 300.0  # address space: a child that its calls have made so much larger is replaced
 
 
-def run_child(connection: Connection, call: Call, payload: Any, memory_mb: float) -> None:
-    """Make one call and send its answer; progress goes the same way before.
+def run_child(connection: Connection, call: Call, memory_mb: float) -> None:
+    """Make calls and send their answers, until one fails or this process has done its share.
 
     Args:
-        connection: to the supervisor, who sends the descriptor of a file for what the child
-            prints; tuples sent back are progress, bytes the pickled answer.
+        connection: to the supervisor, who sends the descriptor of a file for what the child prints, then
+            one payload after another; sent back are progress (simulated time s, words), and of each
+            call its pickled answer with whether it was this child's last.
         call: what to call.
-        payload: its argument.
-        memory_mb: address space that it may take beyond what this process has now, MB.
+        memory_mb: address space that a call may take beyond what this process has before it, MB.
     """
     os.setsid()  # the terminal's Ctrl-C is the supervisor's to handle
     try:
         _redirect_output(recv_handle(connection))
+        die_with_parent()
+        _die_with_supervisor()
+        most_mb = _size_mb() + _GROWTH_MB
+        for left in reversed(range(_MOST_CALLS)):
+            went_well, answer = _answer(call, connection.recv(), connection, memory_mb)
+            gc.collect()  # what a flight leaves hangs in circles
+            last = not went_well or not left or _size_mb() > most_mb
+            connection.send((answer, last))
+            if last:
+                return
     except (EOFError, OSError):
         os._exit(1)  # the sweep was stopped meanwhile
-    die_with_parent()
-    _die_with_supervisor()
+
+
+def _answer(call: Call, payload: Any, connection: Connection, memory_mb: float) -> tuple[bool, bytes]:
+    """Make one call; whether it went well, and its pickled answer."""
     _limit_memory(memory_mb)
     try:
         value = call(payload, lambda time_s, words: connection.send((time_s, words)))
-        answer = pickle.dumps(Answer(status=Status.OK, value=value))
+        return True, pickle.dumps(Answer(status=Status.OK, value=value))
     except BaseException as error:
         _lift_memory_limit()  # or there is no room to tell
-        answer = pickle.dumps(failure(error))
-    connection.send(answer)
+        return False, pickle.dumps(failure(error))
 
 
 def die_with_parent() -> None:
@@ -82,10 +96,16 @@ def _redirect_output(descriptor: int) -> None:
     faulthandler.enable(file=2, all_threads=False)
 
 
+def _size_mb() -> float:
+    """Address space of this process, MB; 0 where the system does not tell."""
+    if not _SIZE.exists():
+        return 0.0
+    return int(_SIZE.read_text().split()[0]) * resource.getpagesize() / 1e6
+
+
 def _limit_memory(memory_mb: float) -> None:
-    if _SIZE.exists():
-        pages = int(_SIZE.read_text().split()[0])
-        limit = pages * resource.getpagesize() + int(memory_mb * 1e6)
+    if size_mb := _size_mb():
+        limit = int((size_mb + memory_mb) * 1e6)
         resource.setrlimit(resource.RLIMIT_AS, (limit, resource.getrlimit(resource.RLIMIT_AS)[1]))
 
 

@@ -15,7 +15,7 @@ Call = Callable[[Any, Progress], Any]  # payload in, picklable value out; import
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Job:
-    """One call to make in a process of its own."""
+    """One call to make in another process."""
 
     name: str  # unique in a sweep
     label: str  # what the progress calls it
@@ -27,7 +27,7 @@ class Allowance:
     """What one job may take."""
 
     timeout_s: float
-    memory_mb: float  # on top of what a fresh process has
+    memory_mb: float  # on top of what its process has before
 
     def __post_init__(self) -> None:
         require_positive(timeout_s=self.timeout_s, memory_mb=self.memory_mb)

@@ -1,8 +1,9 @@
 """Jobs on this machine: a pool of threads, each of which supervises one child process at a time.
 
-joblib's own process pool loses the whole sweep when one worker dies. Its threads start each
-job as a fresh child of a fork server that has the heavy imports and compiled kernels
-already, so that a crash, a hang or a hunger for memory costs that job alone.
+joblib's own process pool loses the whole sweep when one worker dies. Its threads give each
+job to a child of a fork server that has the heavy imports and compiled kernels already. A child
+does several jobs, one at a time; it is replaced after the first that does not go well, so
+that a crash, a hang or a hunger for memory costs that job alone.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from multiprocessing import forkserver
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import ForkServerProcess
 from multiprocessing.reduction import send_handle
-from typing import IO
+from typing import IO, Any
 
 from uavexp.store.records import Status
 from uavexp.sweep.child import run_child
@@ -82,6 +83,22 @@ def run_local(
             results.close()
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Child:
+    """A process that waits for calls, or makes one."""
+
+    process: ForkServerProcess
+    connection: Connection
+    printed: IO[bytes]  # what its present call has printed, a crash's frames among it
+
+    def begin(self, payload: Any) -> None:
+        """Give it a call to make; what is not heard, because it died, is found out by who waits."""
+        self.printed.seek(0)
+        self.printed.truncate()
+        with contextlib.suppress(OSError):
+            self.connection.send(payload)
+
+
 @dataclass(slots=True, kw_only=True)
 class _Supervisor:
     """Runs jobs in children, from several threads at once."""
@@ -95,14 +112,18 @@ class _Supervisor:
     # an interrupt is raised in the main thread, where joblib runs the jobs when they go one at a
     # time; here it finds no child half begun
     _starter: ThreadPoolExecutor = field(default_factory=lambda: ThreadPoolExecutor(max_workers=1))
-    _living: set[ForkServerProcess] = field(default_factory=set)
+    _living: set[_Child] = field(default_factory=set)
+    _idle: list[_Child] = field(default_factory=list)  # those of them that wait for a call
     _stopped: bool = False
 
     def run(self, job: Job) -> Done:
         """Run one job to its end, whatever that is."""
+        child = self._starter.submit(self._take).result()
         begin_s = time.monotonic()
-        with tempfile.TemporaryFile() as errors:
-            answer = self._answer(job, errors)
+        if child is None:
+            answer = Answer(status=Status.KILLED, reason="the sweep was stopped")
+        else:
+            answer = self._ask(child, job, begin_s + self.limits.timeout_s)
         return Done(job=job, answer=answer, wall_s=time.monotonic() - begin_s)
 
     def stop(self) -> None:
@@ -110,78 +131,87 @@ class _Supervisor:
         with self._lock:
             self._stopped = True
             for child in self._living:
-                _kill(child)
+                _kill(child.process)
             for child in self._living:
-                child.join(_PARTING_S)
+                child.process.join(_PARTING_S)
 
-    def _answer(self, job: Job, errors: IO[bytes]) -> Answer:
-        deadline_s = time.monotonic() + self.limits.timeout_s
-        started = self._starter.submit(self._start, job, errors).result()
-        if started is None:
-            return Answer(status=Status.KILLED, reason="the sweep was stopped")
-        child, connection = started
-        with connection:
-            answer = self._wait(job, child, connection, deadline_s)
-            hung = answer is not None and answer.status is Status.HUNG
-            exit_code = self._end(child, grace_s=0.0 if hung else _PARTING_S)
-        return answer if answer is not None else death(exit_code, _tail(errors))
-
-    def _start(self, job: Job, errors: IO[bytes]) -> tuple[ForkServerProcess, Connection] | None:
-        context = multiprocessing.get_context("forkserver")
-        ours, theirs = context.Pipe()
-        with self._lock, theirs:
+    def _take(self) -> _Child | None:
+        """A child that waits for a call, a new one if none does; None when the sweep was stopped."""
+        with self._lock:
             if self._stopped:
                 return None
-            arguments = (theirs, self.call, job.payload, self.limits.memory_mb)
-            child = context.Process(target=run_child, args=arguments, daemon=True)
-            child.start()
+            if self._idle:
+                return self._idle.pop()
+            child = self._start()
             self._living.add(child)
-        with contextlib.suppress(OSError, ValueError):  # it is dead already, or its job was given up
-            send_handle(ours, errors.fileno(), child.pid)
-        return child, ours
+        with contextlib.suppress(OSError, ValueError):  # it is dead already
+            send_handle(child.connection, child.printed.fileno(), child.process.pid)
+        return child
 
-    def _wait(
-        self, job: Job, child: ForkServerProcess, connection: Connection, deadline_s: float
-    ) -> Answer | None:
-        """The child's answer; None when it died without one."""
+    def _start(self) -> _Child:
+        context = multiprocessing.get_context("forkserver")
+        ours, theirs = context.Pipe()
+        with theirs:
+            arguments = (theirs, self.call, self.limits.memory_mb)
+            process = context.Process(target=run_child, args=arguments, daemon=True)
+            process.start()
+        return _Child(process=process, connection=ours, printed=tempfile.TemporaryFile(buffering=0))
+
+    def _ask(self, child: _Child, job: Job, deadline_s: float) -> Answer:
+        """Have a child do a job, and keep it for another one if all went well."""
+        child.begin(job.payload)
+        answer, last = self._wait(job, child, deadline_s)
+        if answer is not None and not last:
+            self._idle.append(child)
+            return answer
+        with child.connection, child.printed:
+            hung = answer is not None and answer.status is Status.HUNG
+            exit_code = self._end(child, grace_s=0.0 if hung else _PARTING_S)
+            return answer or death(exit_code, _tail(child.printed))
+
+    def _wait(self, job: Job, child: _Child, deadline_s: float) -> tuple[Answer | None, bool]:
+        """The child's answer, None when it died without one; and whether that was its last."""
+        connection, sentinel = child.connection, child.process.sentinel
         while (left_s := deadline_s - time.monotonic()) > 0.0:
-            ready = wait([connection, child.sentinel], timeout=left_s)
+            ready = wait([connection, sentinel], timeout=left_s)
             if connection not in ready and ready and not connection.poll():
-                return None
+                return None, True
             try:
                 message = connection.recv() if ready else None
             except (EOFError, OSError):
-                return None
-            if isinstance(message, bytes):
-                answer: Answer = pickle.loads(message)
-                return answer
-            if message is not None and self.watch is not None:
-                self.watch(job, *message)
-        return Answer(status=Status.HUNG, reason=f"not done after {self.limits.timeout_s:g} s")
+                return None, True
+            match message:
+                case bytes(pickled), bool(last):
+                    return pickle.loads(pickled), last
+                case time_s, words:
+                    if self.watch is not None:
+                        self.watch(job, time_s, words)
+        return Answer(status=Status.HUNG, reason=f"not done after {self.limits.timeout_s:g} s"), True
 
-    def _end(self, child: ForkServerProcess, grace_s: float) -> int | None:
+    def _end(self, child: _Child, grace_s: float) -> int | None:
         """Let a child end, or end it; its exit code."""
-        wait([child.sentinel], timeout=grace_s)
-        if not wait([child.sentinel], timeout=0.0):
-            _kill(child)
-            wait([child.sentinel])
+        process = child.process
+        wait([process.sentinel], timeout=grace_s)
+        if not wait([process.sentinel], timeout=0.0):
+            _kill(process)
+            wait([process.sentinel])
         with self._lock:
-            child.join()
+            process.join()
             self._living.discard(child)
-            code: int | None = child.exitcode
+            code: int | None = process.exitcode
         return code
 
 
-def _kill(child: ForkServerProcess) -> None:
+def _kill(process: ForkServerProcess) -> None:
     """Kill a child and all that it started."""
-    pid = child.pid
+    pid = process.pid
     if pid is not None:
         for kill in (os.killpg, os.kill):  # it may not lead a group yet
             with contextlib.suppress(ProcessLookupError, PermissionError):
                 kill(pid, signal.SIGKILL)
 
 
-def _tail(errors: IO[bytes]) -> str:
-    errors.seek(0, os.SEEK_END)
-    errors.seek(max(0, errors.tell() - _DUMP_BYTES))
-    return errors.read().decode(errors="replace")
+def _tail(printed: IO[bytes]) -> str:
+    printed.seek(0, os.SEEK_END)
+    printed.seek(max(0, printed.tell() - _DUMP_BYTES))
+    return printed.read().decode(errors="replace")

@@ -86,6 +86,45 @@ def test_memory_within_the_limit_is_granted() -> None:
     assert run(jobs(("hog_a_little", 1.0)))["hog_a_little"].answer.status is Status.OK
 
 
+@pytest.mark.parametrize(
+    ("deed", "status"),
+    [
+        ("nothing", Status.OK),
+        ("raise", Status.RAISED),
+        ("kill", Status.KILLED),
+        ("sleep", Status.HUNG),
+        ("grow", Status.OK),
+    ],
+)
+def test_a_child_goes_on_after_what_went_well_and_loses_no_other_job(
+    deed: str, status: Status, tmp_path: Path
+) -> None:
+    """Job 5 of 7 fails, or leaves its process half a GB larger: a new one takes over."""
+    given = jobs(
+        *[("note", tmp_path)] * 4, (deed, 60.0 if deed == "sleep" else 1.0), *[("note", tmp_path)] * 2
+    )
+    start_fork_server(["tests.jobs"])
+    limits = Allowance(timeout_s=3.0, memory_mb=1000.0)
+    done = {int(item.job.name): item for item in run_local(act, given, n_jobs=1, limits=limits)}
+    assert [done[number].answer.status for number in range(7)] == [Status.OK] * 4 + [status] + [Status.OK] * 2
+    assert len(noted(tmp_path)) == (1 if deed == "nothing" else 2)
+
+
+def test_a_child_is_replaced_after_its_share_of_jobs(tmp_path: Path) -> None:
+    start_fork_server(["tests.jobs"])
+    for _ in run_local(act, jobs(*[("note", tmp_path)] * 40), n_jobs=1, limits=LIMITS):
+        pass
+    assert len(noted(tmp_path)) == 2
+
+
+def test_a_crash_shows_no_frame_that_an_earlier_job_printed() -> None:
+    start_fork_server(["tests.jobs"])
+    given = jobs(("print_frame", 1.0), ("segfault", 1.0))
+    _, crashed = list(run_local(act, given, n_jobs=1, limits=LIMITS))
+    assert crashed.answer.trace
+    assert not any("long_ago" in frame for frame in crashed.answer.trace)
+
+
 def test_progress_comes_from_the_child() -> None:
     told: list[tuple[str, float, str]] = []
     start_fork_server(["tests.jobs"])
