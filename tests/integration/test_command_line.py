@@ -19,6 +19,7 @@ from uavexp.__main__ import main
 from uavexp.errors import ConfigError
 from uavexp.metrics.evaluate import evaluate
 from uavexp.paths import PACKAGE, conf_folder
+from uavexp.report.__main__ import main as report
 from uavexp.store.logs import read_log
 from uavexp.store.records import read_record
 from uavexp.store.table import FIRST
@@ -66,9 +67,25 @@ def test_a_command_that_flies_ends_with_its_folder(flown: tuple[Path, Any]) -> N
     }  # fmt: skip
     for trial in (folder / "trials").iterdir():
         assert {item.name for item in trial.iterdir()} == {
-            "record.json", "log.npz", "wall.json", "picture.png"
+            "record.json", "log.npz", "wall.json"
         }  # fmt: skip
     assert len(list((folder / "worlds").iterdir())) == 2, "a world for each seed, shared by the strategies"
+
+
+def test_pictures_are_drawn_of_failures_of_single_flights_and_on_demand(
+    flown: tuple[Path, Any], tmp_path: Path
+) -> None:
+    drawn = Path(shutil.copytree(flown[0], tmp_path / "drawn"))
+    assert report([str(drawn), "--pictures"]) == 0
+    on_demand = {file.parent.name: file.read_bytes() for file in drawn.glob("trials/*/picture.png")}
+    assert on_demand.keys() == {item.name for item in (drawn / "trials").iterdir()}
+    assert main([*TINY, "strategy=mcr", "seed=0", "out=alone"]) == 0
+    (alone,) = Path("alone").glob("trials/*/picture.png")
+    assert alone.read_bytes() == on_demand[alone.parent.name]
+    assert (
+        main([*TINY, "seed=0:2", "mission.time_base_s=0.5", "mission.time_per_path_spm=0", "out=late"]) == 0
+    )
+    assert len(list(Path("late").glob("trials/*/picture.png"))) == 2
 
 
 def test_the_table_has_a_row_per_trial_sorted_by_cell_and_seed(flown: tuple[Path, Any]) -> None:

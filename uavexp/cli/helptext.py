@@ -27,8 +27,9 @@ seeds     seed=3   seed=1,4,7   seed=0:20   'seed=range(0,20)'   seed=range (the
 grids     a,b,c after any = flies every combination, with or without -m
 lists     world.size_m=[20,12,3] without spaces; quote what your shell or Hydra's grammar would
           take apart: 'world.path="/data/hall (2).ply"'
-output    trials.parquet, replans.parquet and one folder per trial with record.json, log.npz, picture.png,
-          wall.json; in out=DIR or a new folder under outputs/, which is printed last
+output    trials.parquet, replans.parquet and one folder per trial with record.json, log.npz, wall.json;
+          in out=DIR or a new folder under outputs/, which is printed last
+pictures  of a single flight and of failed ones; python -m uavexp.report DIR --pictures draws the others
 studies   an experiment has one folder, outputs/NAME: the same command again flies what is missing
           or failed; python -m uavexp.report DIR makes tables and figures again without flying
 exit code 0 all flown, 1 some trial did not run to its end or the disk was full,

@@ -141,8 +141,8 @@ class Terminal:
                 self.say(f"{row['strategy']} seed {row['seed']} {ending}: {row['reason']}")
         for row in rows if few else []:
             self.say(f"repeat:  {commands[row['trial']]}")
-            if row["status"] == "ok":
-                self.say(f"picture: {agenda.study.folder / TRIALS / row['trial'] / PICTURE}")
+            if (picture := agenda.study.folder / TRIALS / row["trial"] / PICTURE).exists():
+                self.say(f"picture: {picture}")
 
     def _report(self, folder: Path) -> None:
         """Make the report, and print where its files are: tables and figures by their folder."""

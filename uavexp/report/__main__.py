@@ -1,4 +1,4 @@
-"""`python -m uavexp.report DIR [DIR ...]`: tables, figures and page again, from stored trials."""
+"""`python -m uavexp.report DIR [DIR ...]`: tables, figures and page, or pictures, from stored trials."""
 
 from __future__ import annotations
 
@@ -10,11 +10,13 @@ from pathlib import Path
 
 from uavexp.errors import UavexpError, one_line
 
-_USAGE = """usage: python -m uavexp.report DIR [DIR ...]
+_USAGE = """usage: python -m uavexp.report DIR [DIR ...] [--pictures]
 
 Writes tables, figures, claims and report.html of each study folder from its stored trials;
 nothing is flown. DIR: a folder that `python -m uavexp` left behind, e.g. outputs/mcr/table1
+  --pictures   draw picture.png of every flown trial that has none instead
 """
+_PICTURES = "--pictures"
 _PATIENCE_S = 2.0  # nothing is said about work that is done sooner
 
 
@@ -24,13 +26,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     0; 1 the disk was full; 2 bad input; 130 interrupted.
     """
     os.environ["MPLBACKEND"] = "Agg"
-    names = list(sys.argv[1:] if arguments is None else arguments)
+    typed = sys.argv[1:] if arguments is None else arguments
+    names = [word for word in typed if word != _PICTURES]
     if not names or {"-h", "--help"} & set(names):
         (sys.stdout if names else sys.stderr).write(_USAGE)
         return 0 if names else 2
     try:
         for name in names:
-            _report(Path(name))
+            (_report if len(names) == len(typed) else _draw)(Path(name))
     except UavexpError as error:
         sys.stderr.write(f"error: {one_line(error)}\n")
         return error.exit_code
@@ -38,6 +41,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stderr.write("interrupted\n")
         return 130
     return 0
+
+
+def _draw(folder: Path) -> None:
+    from uavexp.report.picture_files import draw_missing
+
+    for path in draw_missing(folder):
+        sys.stdout.write(f"{path}\n")
 
 
 def _report(folder: Path) -> None:

@@ -16,7 +16,7 @@ from uavexp.errors import ConfigError
 from uavexp.flight import Trial
 from uavexp.log import Replan
 from uavexp.store.logs import arrays_digest, log_arrays, pack
-from uavexp.store.records import LOG, PICTURE, RECORD, WALL, Status, canonical_json, seal
+from uavexp.store.records import LOG, RECORD, WALL, Status, canonical_json, seal
 from uavexp.types import Outcome
 
 _REPLAN = (
@@ -45,21 +45,17 @@ def identity(cell: Cell) -> dict[str, Any]:
     return {"strategy": cell.strategy, "options": cell.options, "config": {**config, **numbers}}
 
 
-def trial_files(
-    trial: Trial, head: Mapping[str, Any], wall: Mapping[str, Any], picture: bytes
-) -> dict[str, bytes]:
+def trial_files(trial: Trial, head: Mapping[str, Any], wall: Mapping[str, Any]) -> dict[str, bytes]:
     """Contents of the files of a flown trial.
 
     Args:
         trial: what was flown.
         head: its identity, code and lock digests.
         wall: clock times and the command, kept beside the record.
-        picture: of the flight, png.
     """
     arrays = log_arrays(trial.log)
     return {
         LOG: pack(arrays),
-        PICTURE: picture,
         WALL: _json({**wall, "laps": laps(trial)}),
         RECORD: seal({**head, **measured(trial), "log": arrays_digest(arrays)}).encode(),
     }

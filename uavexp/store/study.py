@@ -4,7 +4,7 @@
     run.json          how it ran, each time: command, machine, clock times
     trials.parquet    one row per trial, sorted by cell and seed
     replans.parquet   one row per planning request of every trial
-    trials/NAME/      record.json, log.npz, wall.json, picture.png of one trial
+    trials/NAME/      record.json, log.npz, wall.json of one trial; picture.png of one flown alone or failed
     trials/NAME.aside-1/  an earlier try at NAME: failed, or damaged since
     worlds/DIGEST.npz the true geometry, once for all trials flown in it
 

@@ -116,6 +116,7 @@ def _jobs(
                 version=dict(code),
                 command=repeat_command(cell, seed, user_folder),
                 worlds=folder / WORLDS,
+                picture=len(command.cells) * len(command.seeds) == 1,
             ),
         )
         for seed in sorted(command.seeds)

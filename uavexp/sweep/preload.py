@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import gc
 import importlib
-import io
 import pkgutil
 
 from uavexp.config.build import GROUPS
 from uavexp.sweep import kernels
 
-_ALSO = ("uavexp.trial", "uavexp.metrics", "uavexp.report.picture", "uavexp.sweep.trial_job")
+_ALSO = ("uavexp.trial", "uavexp.metrics", "uavexp.sweep.trial_job")
 
 
 def _import_everything() -> None:
@@ -23,20 +22,6 @@ def _import_everything() -> None:
         importlib.import_module(name)
 
 
-def _draw_something() -> None:
-    """Let matplotlib load its fonts."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    from uavexp.report import picture_layout, style
-
-    with style.house_style():
-        sheet = picture_layout.lay_out((20.0, 10.0))
-        FigureCanvasAgg(sheet.figure)
-        sheet.plan.set_title("uavexp")
-        sheet.figure.savefig(io.BytesIO(), format="png")
-
-
 _import_everything()
-_draw_something()
 kernels.load()
 gc.freeze()  # or the first collection in a child copies every page it was given

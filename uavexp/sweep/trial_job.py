@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +11,7 @@ from uavexp.config.composition import Cell
 from uavexp.errors import RecordError
 from uavexp.flight import Trial, fly_cell
 from uavexp.store.outputs import failure_files, trial_files
-from uavexp.store.records import code_digest, lock_digest
+from uavexp.store.records import PICTURE, code_digest, lock_digest
 from uavexp.store.worlds import is_whole, world_bytes
 from uavexp.sweep.job import Answer, Job, Progress
 
@@ -27,6 +26,7 @@ class TrialJob:
     version: dict[str, Any]  # code and lock digests
     command: str  # that repeats it
     worlds: Path  # where worlds are kept that need not be sent again
+    picture: bool  # draw it also when it succeeds
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,24 +45,23 @@ def fly_job(asked: TrialJob, progress: Progress) -> Flown:
     begin_s = time.perf_counter()
     trial = fly_cell(asked.cell, asked.seed, progress)
     wall = {"command": asked.command, "wall_trial_s": time.perf_counter() - begin_s}
-    digest = trial.world.digest
+    digest, success = trial.world.digest, bool(trial.metrics["success"])
     known = is_whole(asked.worlds / f"{digest}.npz")
+    files = trial_files(trial, {**asked.identity, **asked.version}, wall)
     return Flown(
-        files=trial_files(trial, {**asked.identity, **asked.version}, wall, _picture(trial, asked.command)),
+        files=files | (_picture(trial, asked) if asked.picture or not success else {}),
         world=(digest, None if known else world_bytes(trial.world)),
         outcome=str(trial.log.outcome),
-        success=bool(trial.metrics["success"]),
+        success=success,
         reason=trial.log.reason,
     )
 
 
-def _picture(trial: Trial, command: str) -> bytes:
-    from uavexp.report.picture import draw  # matplotlib, of which the supervisor has no need
+def _picture(trial: Trial, asked: TrialJob) -> dict[str, bytes]:
+    from uavexp.report.picture_files import picture_png  # matplotlib, which most flights do without
 
-    shown = {**trial.metrics, "seed": trial.seed, "strategy": trial.cell.strategy}
-    picture = io.BytesIO()
-    draw(trial.world, trial.log, shown, command, picture)
-    return picture.getvalue()
+    shown = {**asked.identity, "metrics": trial.metrics}
+    return {PICTURE: picture_png(trial.world, trial.log, shown, asked.command)}
 
 
 def version() -> dict[str, Any]:
