@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
@@ -83,6 +83,13 @@ class Parts:
             "controller.rate_hz": self.controller.rate_hz,
         }
 
+    def tick_steps(self) -> tuple[int, int, int]:
+        """Steps from one scan, one ESDF update and one choice of a goal to the next."""
+        sensor, mapping, explorer, _ = (
+            steps_per(self.step_s, name, 1.0 / rate_hz) for name, rate_hz in self.rates_hz().items()
+        )
+        return sensor, mapping, explorer
+
 
 def steps_per(step_s: float, name: str, duration_s: float) -> int:
     """Number of steps in a duration; raise `ConfigError` unless it is a whole number."""
@@ -117,13 +124,13 @@ def fly_trial(parts: Parts, seed: int, progress: Progress | None = None) -> tupl
 def fly(parts: Parts, world: World, seed: int, progress: Progress | None = None) -> TrialLog:
     """Fly one trial in a given world; every rate is a whole number of steps (see `Parts`)."""
     flight = _begin(parts, world, seed)
-    motion, pilot, scene, watch = flight.motion, flight.craft.pilot, flight.scene, flight.watch
-    period = {name: steps_per(parts.step_s, name, 1.0 / rate) for name, rate in parts.rates_hz().items()}
-    tracks, ending = Tracks.none(), None
+    craft, motion, scene, watch = flight.craft, flight.motion, flight.scene, flight.watch
+    pilot, every, tracks = craft.pilot, parts.tick_steps(), Tracks.none()
 
-    for step, following in pairwise(flight.ticks(period)):
-        time_s = step * parts.step_s
-        if step % period["sensor.rate_hz"] == 0:
+    for step, following in pairwise(flight.ticks(every)):
+        time_s, reference = step * parts.step_s, None
+        senses, maps, chooses = (step % steps == 0 for steps in every)
+        if senses:
             with watch.lap("sense"):
                 scan = parts.sensor.capture(motion.state, motion.estimate, time_s)
             if len(scene.bodies):
@@ -131,23 +138,25 @@ def fly(parts: Parts, world: World, seed: int, progress: Progress | None = None)
                     scan, tracks = parts.detection.detect(scan, parts.mapping.field, scene.bodies)
             with watch.lap("integrate"):
                 parts.mapping.integrate(scan)
-        reference = pilot.reference(time_s, parts.step_s)
-        if step % period["mapping.esdf_rate_hz"] == 0:
+        if maps:
             with watch.lap("esdf"):
                 update = parts.mapping.update(time_s)
-        see = partial(flight.observe, time_s, reference, update, tracks)
-        if step % period["explorer.rate_hz"] == 0:
-            pilot.explore(see())
-        if step % period["mapping.esdf_rate_hz"] == 0:
-            seen = see()
-            flight.craft.recorder.tick(seen, pilot.decide(seen))
+        if maps or chooses:
+            reference = pilot.reference(time_s, parts.step_s)
+            see = partial(flight.observe, time_s, reference, update, tracks)
+            if chooses:
+                pilot.explore(see())
+            if maps:
+                seen = see()
+                craft.recorder.tick(seen, pilot.decide(seen))
+            judge = flight.judge(see())
         with watch.lap("fly"):
-            ending = motion.fly(step, following, reference, flight.judge(see()))
+            ending = motion.fly(step, following, reference, judge)
         if ending is not None:
-            break
+            return flight.log(ending)
         if progress is not None and step % _LOOK_STEPS == 0:
             progress(time_s, f"{len(pilot.replans)} plans")
-    return flight.log(ending or Ending(following - 1, Outcome.TIMEOUT))
+    return flight.log(Ending(following - 1, Outcome.TIMEOUT))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -161,11 +170,10 @@ class _Flight:
     motion: Motion
     watch: Stopwatch
 
-    def ticks(self, period: Mapping[str, int]) -> list[int]:
-        """Numbers of the steps at which more is due than to fly on, and of the one that is not flown."""
+    def ticks(self, every: Sequence[int]) -> list[int]:
+        """Numbers of the steps at which more is due than to fly on, and of the one after the last."""
         end = len(self.craft.recorder.rows)
-        due = [steps for name, steps in period.items() if name != "controller.rate_hz"]
-        return sorted({end}.union(*(range(0, end, steps) for steps in (*due, _LOOK_STEPS))))
+        return sorted({end}.union(*(range(0, end, steps) for steps in (*every, _LOOK_STEPS))))
 
     def observe(self, time_s: float, reference: Reference, update: MapUpdate, tracks: Tracks) -> Observation:
         """What the deciding roles see now."""

@@ -62,5 +62,5 @@ class Explore:
         """EXPLORED when no frontier has been reachable for `patience_s`."""
         if observation.best_goal is not None:
             self._last_goal_s = float(flown.time_s[-1])
-        is_over = flown.time_s - self._last_goal_s >= self.patience_s
-        return (int(is_over.argmax()), Outcome.EXPLORED) if is_over.any() else None
+        over = np.flatnonzero(flown.time_s - self._last_goal_s >= self.patience_s)
+        return (int(over[0]), Outcome.EXPLORED) if len(over) else None

@@ -52,8 +52,9 @@ class Goto:
 
     def outcome(self, flown: Flown, observation: Observation) -> tuple[int, Outcome] | None:
         """REACHED within the tolerance of the target."""
-        is_there = np.linalg.norm(flown.position_m - self._task().target_m, axis=1) <= self.tolerance_m
-        return (int(is_there.argmax()), Outcome.REACHED) if is_there.any() else None
+        gap_m = flown.position_m - self._task().target_m
+        there = np.flatnonzero(np.sqrt((gap_m * gap_m).sum(axis=1)) <= self.tolerance_m)
+        return (int(there[0]), Outcome.REACHED) if len(there) else None
 
     def _task(self) -> World:
         if self._world is None:

@@ -47,13 +47,13 @@ class Motion(Protocol):
     state: State  # in truth
     estimate: State  # as it believes
 
-    def fly(self, first: int, end: int, reference: Reference, judge: Judge) -> Ending | None:
+    def fly(self, first: int, end: int, reference: Reference | None, judge: Judge) -> Ending | None:
         """Fly from one tick to the next.
 
         Args:
             first: number of the step at the tick.
             end: number of the step at the next one.
-            reference: to follow in the first step; for the others the pilot is asked.
+            reference: to follow in the first step, if the pilot was asked already.
             judge: asked of every step once it is recorded.
 
         Returns:

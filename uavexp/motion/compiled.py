@@ -51,7 +51,7 @@ class Compiled:
     _command: Float = field(init=False, default_factory=lambda: np.empty(8))
     _work: Float = field(init=False, default_factory=lambda: np.empty((6, 17)))
 
-    def fly(self, first: int, end: int, reference: Reference, judge: Judge) -> Ending | None:
+    def fly(self, first: int, end: int, reference: Reference | None, judge: Judge) -> Ending | None:
         """Fly from one tick to the next (see `Motion`)."""
         references = self._references(first, end, reference)
         while first < end:
@@ -63,9 +63,12 @@ class Compiled:
             self._arrive(first, is_near)
         return None
 
-    def _references(self, first: int, end: int, reference: Reference) -> Float:
+    def _references(self, first: int, end: int, reference: Reference | None) -> Float:
         """Rows of `pilot.following` for the steps of the stretch."""
-        row, step_s = row_of(reference)[None], self.craft.step_s
+        step_s = self.craft.step_s
+        if reference is None:
+            return self.pilot.references(times_s(first, end, step_s), step_s)
+        row = row_of(reference)[None]
         if end == first + 1:
             return row
         return np.concatenate([row, self.pilot.references(times_s(first + 1, end, step_s), step_s)])

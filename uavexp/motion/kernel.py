@@ -36,7 +36,7 @@ def fly_free(
         before: (17,) takes `x` as it was a step ago.
         command: (8,) thrust, attitude and body rate as commanded last; kept up to date.
         work: (6, 17) scratch space.
-        references: (N, 11) of `pilot.following`, one per step.
+        references: (N, 14) of `pilot.following`, one per step.
         rows: (N, 19) of the recorder; each step's is written before it is flown.
         first: number of the first step.
         command_steps: from one command to the next.

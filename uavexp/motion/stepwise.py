@@ -17,12 +17,12 @@ class Stepwise:
     estimate: State
     _command: Command = field(init=False)
 
-    def fly(self, first: int, end: int, reference: Reference, judge: Judge) -> Ending | None:
+    def fly(self, first: int, end: int, reference: Reference | None, judge: Judge) -> Ending | None:
         """Fly from one tick to the next (see `Motion`)."""
         craft, scene = self.craft, self.craft.contact.scene
         for step in range(first, end):
             time_s = step * craft.step_s
-            if step > first:
+            if reference is None or step > first:
                 reference = craft.pilot.reference(time_s, craft.step_s)
             if step % craft.command_steps == 0:
                 self._command = craft.controller.command(self.estimate, reference)

@@ -1,7 +1,7 @@
 """References along a trajectory, for as many steps as are asked for at once.
 
-A row (11,) is what the controller is asked to follow in one step: position, velocity, acceleration, yaw
-and yaw rate.
+A row (14,) is what the controller is asked to follow in one step: position, velocity, acceleration, yaw,
+yaw rate and jerk.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from uavexp.arrays import Float
 from uavexp.geometry import wrap_angle
 from uavexp.pilot.heading import bearing_rad, rate_to
-from uavexp.trajectory import evaluate_pieces
+from uavexp.trajectory import differentiate_pieces, evaluate_pieces
 from uavexp.types import Reference
 
 
@@ -30,7 +30,7 @@ def follow(
     most_radps: float,
     step_s: float,
 ) -> Float:
-    """Rows (N, 11) of the steps at times (N,), the yaw turning from step to step.
+    """Rows (N, 14) of the steps at times (N,), the yaw turning from step to step.
 
     Args:
         breaks_s: of the `Trajectory`.
@@ -48,8 +48,9 @@ def follow(
     ahead_s = np.minimum(np.maximum(now_s, moves_s) + lookahead_s, np.maximum(now_s, breaks_s[-1]))
     position, velocity, acceleration = evaluate_pieces(breaks_s, coefficients, now_s)
     ahead = evaluate_pieces(breaks_s, coefficients, ahead_s)[0] - position
-    rows = np.zeros((len(times_s), 11))
+    rows = np.zeros((len(times_s), 14))
     rows[:, 0:3], rows[:, 3:6], rows[:, 6:9] = position, velocity, acceleration
+    rows[:, 11:14] = differentiate_pieces(breaks_s, coefficients, now_s, 3)
     for n in range(len(times_s)):
         bearing = bearing_rad(wanted_rad, ahead[n])
         if not math.isnan(bearing):
@@ -60,6 +61,19 @@ def follow(
 
 
 def row_of(reference: Reference) -> Float:
-    """The row (11,) of a reference."""
+    """The row (14,) of a reference."""
+    motion = (reference.position_m, reference.velocity_mps, reference.acceleration_mps2)
     turn = (reference.yaw_rad, reference.yaw_rate_radps)
-    return np.concatenate([reference.position_m, reference.velocity_mps, reference.acceleration_mps2, turn])
+    return np.concatenate([*motion, turn, reference.jerk_mps3])
+
+
+def reference_of(row: Float) -> Reference:
+    """The reference in a row (14,)."""
+    return Reference(
+        position_m=row[0:3],
+        velocity_mps=row[3:6],
+        acceleration_mps2=row[6:9],
+        yaw_rad=float(row[9]),
+        yaw_rate_radps=float(row[10]),
+        jerk_mps3=row[11:14],
+    )

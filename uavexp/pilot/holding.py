@@ -20,10 +20,10 @@ from uavexp.braking import REST_MPS, braking_trajectory, with_stop
 from uavexp.log import Replan
 from uavexp.parameters import Count, NonNegative, option
 from uavexp.pilot.base import Crew
-from uavexp.pilot.following import follow, row_of
+from uavexp.pilot.following import follow, reference_of, row_of
 from uavexp.pilot.heading import Heading, bearing_rad
 from uavexp.pilot.noting import replan_of
-from uavexp.trajectory import Trajectory, derivative, evaluate, hover_before
+from uavexp.trajectory import Trajectory, evaluate, hover_before
 from uavexp.types import Decision, Goal, Observation, PlanRequest, PlanResult, PlanStatus, Reference
 
 _GOALS_FAULT = (PlanStatus.GOAL_BLOCKED, PlanStatus.NO_PATH, PlanStatus.NOT_CLEAR)  # another may do
@@ -94,18 +94,10 @@ class HoldingPilot:
             return self._look_around(step_s)
         if self.trajectory is None:
             return self._hold(self.crew.start_m)
-        row = self._follow(self.trajectory, np.array([time_s]), step_s)[0]
-        return Reference(
-            position_m=row[0:3],
-            velocity_mps=row[3:6],
-            acceleration_mps2=row[6:9],
-            yaw_rad=float(row[9]),
-            yaw_rate_radps=float(row[10]),
-            jerk_mps3=derivative(self.trajectory, np.array([max(time_s, self.trajectory.start_s)]), 3)[0],
-        )
+        return reference_of(self._follow(self.trajectory, np.array([time_s]), step_s)[0])
 
     def references(self, times_s: Float, step_s: float) -> Float:
-        """`reference` of one step to come after the other, as rows (N, 11) of `following`."""
+        """`reference` of one step to come after the other, as rows (N, 14) of `following`."""
         pending = self._pending
         adopts = pending is not None and times_s[-1] >= pending.trajectory.start_s - 1e-9
         if self.trajectory is None or self.failure or adopts:

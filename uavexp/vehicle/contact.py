@@ -92,11 +92,15 @@ class ContactTracker:
     body_size_m: tuple[float, float, float]
     release_gap_m: float = 0.02
     release_time_s: float = 0.2
+    _reach_m: float = field(init=False, repr=False)  # from the centre to a corner
     _measured_at_m: Float = field(init=False, repr=False, default_factory=lambda: np.zeros(3))
     _clearance_m: float = field(init=False, repr=False, default=-1.0)
     _movers: Bodies = field(init=False, repr=False, default_factory=Bodies.none)  # a step ago
     _open: dict[int, Contact] = field(init=False, repr=False, default_factory=dict)
     _closed: list[Contact] = field(init=False, repr=False, default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._reach_m = 0.5 * float(np.linalg.norm(self.body_size_m))
 
     def advance(self, before: State, after: State, time_s: float) -> tuple[State, bool]:
         """Resolve the step that ends at `time_s`, where the scene's movers are by now; see `resolve`."""
@@ -123,10 +127,6 @@ class ContactTracker:
     def free_ball(self) -> tuple[Float, float]:
         """Centre (3,) and radius of a ball in which the body, wherever its centre, meets no fixed surface."""
         return self._measured_at_m, -1.0 if self._open else self._clearance_m - self._reach_m
-
-    @property
-    def _reach_m(self) -> float:
-        return 0.5 * float(np.linalg.norm(self.body_size_m))
 
     def _moved_m(self) -> Float:
         """How far each mover has come since the last step (B, 3); 0 for one that appears or leaves."""
