@@ -26,24 +26,25 @@ from __future__ import annotations
 import math
 from dataclasses import field
 from enum import StrEnum
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, TypeVar
 
 import numpy as np
 
-from uavexp.arrays import Bool, Float, Int32
+from uavexp.arrays import Bool, Float
 from uavexp.errors import require
 from uavexp.explorer.planar import (
     ascend,
+    cluster_centroids,
     connected_components,
     density_clusters,
-    frontier_cells,
-    split_centroids,
     unknown_within,
 )
-from uavexp.explorer.view import Search, View, view_of
-from uavexp.mapping.projection import project
+from uavexp.explorer.view import KNOWN, Passage, Plane, prices, straight
+from uavexp.mapping.projection import Band
 from uavexp.parameters import Count, NonNegative, Positive, Unknown, Whole, between, option
 from uavexp.types import Goal, Limits, Observation
+
+Scalar = TypeVar("Scalar", float, Float)
 
 
 class Clustering(StrEnum):
@@ -97,6 +98,8 @@ class Frontier:
     _body_radius_m: float = field(init=False, repr=False, default=0.0)
     _current: Goal | None = field(init=False, repr=False, default=None)
     _aside: list[tuple[float, Float]] = field(init=False, repr=False, default_factory=list)
+    _plane: Plane | None = field(init=False, repr=False, default=None)
+    _passages: dict[float, Passage] = field(init=False, repr=False, default_factory=dict)  # by clearance
 
     def __post_init__(self) -> None:
         require(
@@ -109,8 +112,8 @@ class Frontier:
         """Begin a trial at this flight height."""
         self._height_m = flight_height_m
         self._body_radius_m = limits.body_radius_m
-        self._current = None
-        self._aside = []
+        self._current, self._plane = None, None
+        self._aside, self._passages = [], {}
 
     def reject(self, position_m: Float, time_s: float) -> None:
         """Set goals around this position aside for `set_aside_s`."""
@@ -122,26 +125,61 @@ class Frontier:
 
         With `fresh` the kept goal has no bonus: a plan is made anyway, so the best goal is taken.
         """
-        now_s = observation.time_s
+        now_s, bonus = observation.time_s, 0.0 if fresh else self.hysteresis
         self._aside = [entry for entry in self._aside if entry[0] > now_s]
-        best, kept = self._choose(observation, self.min_clearance_m)
+        plane = self._look(observation)
+        best, kept = self._choose(plane, observation, self.min_clearance_m, bonus)
         if best is None and kept is None:
             best = self._last_resort(observation)
         if best is None and kept is None:  # a doorway passed before it was mapped may look too narrow
-            best, kept = self._choose(observation, min(self._body_radius_m, self.min_clearance_m))
-        bonus = 0.0 if fresh else self.hysteresis
-        # Information is left out of `kept`: what that goal promised is being seen on the way.
-        if kept is None or (best is not None and (best.is_target or best.score >= kept.score + bonus)):
+            clearance_m = min(self._body_radius_m, self.min_clearance_m)
+            best, kept = self._choose(plane, observation, clearance_m, bonus)
+        if kept is None or best is not None:
             self._current = best
         return self._current
 
-    def _choose(self, observation: Observation, clearance_m: float) -> tuple[Goal | None, Goal | None]:
-        """Best goal, and the kept one scored anew, over cells with more than this clearance."""
-        view = self._view(observation, clearance_m)
-        points_m = self._candidates(view, observation)
-        search = self._search(view, observation, points_m)
-        best = self._target(search, observation) or self._best(search, points_m)
-        return best, self._kept(search, observation)
+    def _look(self, observation: Observation) -> Plane:
+        """The plane, up to date with the map."""
+        plane = self._plane
+        if plane is None or plane.field is not observation.field:
+            band = Band(
+                z_min_m=self._height_m - self.band_below_m,
+                z_max_m=self._height_m + self.band_above_m,
+                flight_height_m=self._height_m,
+                cell_m=self.cell_m,
+                occupied_below_m=self.occupied_below_m,
+            )
+            plane = self._plane = Plane(observation.field, band, observation.flight_bounds_m)
+            self._passages = {}
+        parts = plane.update()
+        for passage in self._passages.values():
+            passage.note(parts)
+        return plane
+
+    def _passage(self, plane: Plane, observation: Observation, clearance_m: float) -> Passage:
+        """The passage for a clearance, up to date."""
+        passage, target_m = self._passages.get(clearance_m), observation.target_m
+        target = None if target_m is None else plane.map.cell_of(target_m)
+        if passage is None or passage.target != target:
+            passage = Passage(plane=plane, clearance_m=clearance_m, escape_m=self.escape_m, target=target)
+            self._passages[clearance_m] = passage
+        passage.update(plane.map.cell_of(observation.state.position_m))
+        return passage
+
+    def _choose(
+        self, plane: Plane, observation: Observation, clearance_m: float, bonus: float
+    ) -> tuple[Goal | None, Goal | None]:
+        """Best goal, and the kept one scored anew, over cells with more than this clearance.
+
+        Beside a kept goal none is best but the target, or one that beats it by the bonus.
+        """
+        passage = self._passage(plane, observation, clearance_m)
+        points_m = self._candidates(plane, observation)
+        target = self._target(passage, observation)
+        kept = self._kept(passage, observation, target)
+        # Information is left out of `kept`: what that goal promised is being seen on the way.
+        least = -math.inf if kept is None else kept.score + bonus
+        return target or self._best(passage, points_m, least), kept
 
     def _last_resort(self, observation: Observation) -> Goal | None:
         """The target through unknown space when no frontier is left; the planner searches in 3D."""
@@ -150,93 +188,77 @@ class Frontier:
             return None
         return Goal(position_m=target_m, is_target=True, score=-math.inf)
 
-    def _kept(self, search: Search, observation: Observation) -> Goal | None:
+    def _target(self, passage: Passage, observation: Observation) -> Goal | None:
+        """The mission's target as a goal, None unless known-free cells lead there."""
+        target_m, cell = observation.target_m, passage.target
+        known = cell is not None and passage.knows_a_way(cell)
+        optimistic = self.unknown is Unknown.OPTIMISTIC
+        passage.begin(prices(self.unknown_cost, occupied=1.0) if optimistic else KNOWN)
+        if not known or cell is None or target_m is None or self._is_aside(target_m):
+            return None
+        score = self._score(passage.from_vehicle(cell), 0.0)
+        return Goal(position_m=target_m, is_target=True, score=score)
+
+    def _kept(self, passage: Passage, observation: Observation, target: Goal | None) -> Goal | None:
         """Score the current goal anew; None when it is near, set aside or not reachable any more."""
         goal, position_m = self._current, observation.state.position_m
-        if goal is None:
-            return None
-        distance_m = float(np.linalg.norm(goal.position_m - position_m))
-        if goal.is_target:
-            return self._target(search, observation)
-        if distance_m <= self.commit_m:
+        if goal is None or goal.is_target:
+            return target if goal is not None else None
+        if float(np.linalg.norm(goal.position_m - position_m)) <= self.commit_m:
             # Visited. A frontier that is still there a few steps on cannot be seen from here.
             self._aside.append((observation.time_s + self.set_aside_s, goal.position_m))
-        if self._is_aside(goal.position_m):
-            return None
         clearance_m = float(observation.field.distance_m(goal.position_m[None])[0])
-        score = float(self._scores(search, goal.position_m[None])[0])
-        if clearance_m <= self.min_clearance_m or not math.isfinite(score):
+        if self._is_aside(goal.position_m) or clearance_m <= self.min_clearance_m:
+            return None
+        cell = passage.plane.map.cell_of(goal.position_m)
+        score = self._score(passage.from_vehicle(cell), passage.from_target(cell))
+        if not math.isfinite(score):
             return None
         return Goal(position_m=goal.position_m, is_target=False, score=score)
 
-    def _view(self, observation: Observation, clearance_m: float) -> View:
-        planar = project(
-            observation.field,
-            z_min_m=self._height_m - self.band_below_m,
-            z_max_m=self._height_m + self.band_above_m,
-            flight_height_m=self._height_m,
-            cell_m=self.cell_m,
-            occupied_below_m=self.occupied_below_m,
-        )
-        position_m, bounds_m = observation.state.position_m, observation.flight_bounds_m
-        return view_of(planar, position_m, bounds_m, clearance_m, self.escape_m)
+    def _best(self, passage: Passage, points_m: Float, least: float) -> Goal | None:
+        """The candidate with the highest score, the first of equals; None if all are below `least`.
 
-    def _search(self, view: View, observation: Observation, points_m: Float) -> Search:
-        """Path lengths to and from everything that will be scored: candidates, kept goal, target."""
-        target_m = observation.target_m
-        kept_m = self._current.position_m[None] if self._current is not None else np.zeros((0, 3))
-        wanted = view.flat(np.concatenate([points_m, kept_m]))
-        known = view.known
-        passable = view.clear if self.unknown is Unknown.OPTIMISTIC else known
-        if target_m is None:
-            from_vehicle = view.lengths(passable, view.vehicle, wanted, self.unknown_cost)
-            return Search(view, from_vehicle, np.zeros_like(from_vehicle), False)
-        target, target_flat = view.planar.cell_of(target_m), view.flat(target_m[None])
-        target_known = bool(known[target]) and bool(
-            np.isfinite(view.lengths(known, view.vehicle, target_flat, 1.0)[target])
-        )
-        from_target = view.lengths(view.clear, target, wanted, 1.0)
-        if target_known:  # only then can it be the goal, and its cost matters
-            wanted = np.concatenate([wanted, target_flat])
-        from_vehicle = view.lengths(passable, view.vehicle, wanted, self.unknown_cost)
-        return Search(view, from_vehicle, from_target, target_known)
+        Ways are asked for in the order of the scores that straight ones would give, as long as
+        these can still win, and no further than that.
+        """
+        plane, cell_m = passage.plane, self.cell_m
+        cells = plane.cells_of(points_m)
+        radius = self.neighbourhood_m / cell_m
+        gain = self.alpha * unknown_within(plane.map.state, plane.inside, cells, radius)
+        ahead = np.zeros(len(cells)) if passage.target is None else straight(cells, passage.target)
+        bound = self._score(straight(cells, passage.vehicle), ahead) + gain
+        best = -1
+        for n in np.argsort(-bound, kind="stable"):
+            if bound[n] < least:
+                break
+            cell, spare = (int(cells[n, 0]), int(cells[n, 1])), gain[n] - least
+            there = passage.from_vehicle(
+                cell, _most(spare - self.gamma * ahead[n] * cell_m, self.beta * cell_m)
+            )
+            if there == math.inf:
+                continue
+            beyond = passage.from_target(cell, _most(spare - self.beta * there * cell_m, self.gamma * cell_m))
+            score = self._score(there, beyond) + gain[n]
+            if math.isfinite(score) and (score > least or (score == least and not 0 <= best < n)):
+                best, least = int(n), float(score)
+        return Goal(position_m=points_m[best], is_target=False, score=least) if best >= 0 else None
 
-    def _target(self, search: Search, observation: Observation) -> Goal | None:
-        """The mission's target as a goal, None unless known-free cells lead there."""
-        target_m = observation.target_m
-        if target_m is None or not search.target_known or self._is_aside(target_m):
-            return None
-        planar = search.view.planar
-        cost_m = float(search.from_vehicle[planar.cell_of(target_m)]) * planar.cell_m
-        return Goal(position_m=target_m, is_target=True, score=-self.beta * cost_m)
-
-    def _best(self, search: Search, points_m: Float) -> Goal | None:
-        """The candidate with the highest score, the first of equals."""
-        scores = self._scores(search, points_m)
-        points_m, scores = points_m[np.isfinite(scores)], scores[np.isfinite(scores)]
-        if len(points_m) == 0:
-            return None
-        scores = scores + self.alpha * self._information(search.view, points_m)
-        best = int(np.argmax(scores))
-        return Goal(position_m=points_m[best], is_target=False, score=float(scores[best]))
-
-    def _clusters(self, view: View) -> list[Int32]:
-        cells = frontier_cells(view.planar.state, view.inside)
+    def _centroids(self, plane: Plane) -> Float:
+        """Mean cell (N, 2) of each cluster of the frontier, or of its parts if it is long."""
+        index = np.column_stack(np.divmod(np.flatnonzero(plane.frontier), plane.frontier.shape[1]))
         if self.clustering is Clustering.DBSCAN:
-            clusters = density_clusters(cells, self.dbscan_radius_m / self.cell_m, self.dbscan_min_neighbours)
+            cluster = density_clusters(index, self.dbscan_radius_m / self.cell_m, self.dbscan_min_neighbours)
         else:
-            clusters = connected_components(cells)
-        return [cluster for cluster in clusters if len(cluster) >= self.min_cluster_cells]
-
-    def _candidates(self, view: View, observation: Observation) -> Float:
-        """One point (N, 3) for each cluster, neither too near the vehicle nor set aside."""
-        clusters = self._clusters(view)
-        if not clusters:
-            return np.zeros((0, 3))
+            cluster = connected_components(plane.frontier, index)
+        order = np.argsort(cluster, kind="stable")
         limit = self.max_cluster_m / self.cell_m
-        cells = np.concatenate([split_centroids(cluster, limit) for cluster in clusters])
-        start_m = np.column_stack([view.planar.centre_m(cells), np.full(len(cells), self._height_m)])
-        map_ = observation.field
+        return np.asarray(cluster_centroids(index[order], cluster[order], self.min_cluster_cells, limit))
+
+    def _candidates(self, plane: Plane, observation: Observation) -> Float:
+        """One point (N, 3) for each cluster, neither too near the vehicle nor set aside."""
+        cells, map_ = self._centroids(plane), observation.field
+        start_m = np.column_stack([plane.map.centre_m(cells), np.full(len(cells), self._height_m)])
         points_m: Float = ascend(
             map_.distance,
             map_.origin_m,
@@ -251,18 +273,9 @@ class Frontier:
         clear = map_.distance_m(points_m) > self.min_clearance_m
         return np.asarray(points_m[far & clear & ~self._aside_of(points_m)])
 
-    def _scores(self, search: Search, points_m: Float) -> Float:
-        """Score (N,) of points (N, 3) without what they promise to show; -inf: no way there."""
-        view = search.view
-        flat = view.flat(points_m)
-        cost_m = search.from_vehicle.ravel()[flat].astype(np.float64) * view.planar.cell_m
-        to_target_m = search.from_target.ravel()[flat].astype(np.float64) * view.planar.cell_m
-        return np.asarray(-self.beta * cost_m - self.gamma * to_target_m)
-
-    def _information(self, view: View, points_m: Float) -> Float:
-        """J_info (N,): unknown cells around each point (N, 3)."""
-        radius = self.neighbourhood_m / self.cell_m
-        return np.asarray(unknown_within(view.planar.state, view.inside, view.flat(points_m), radius))
+    def _score(self, there: Scalar, beyond: Scalar) -> Scalar:
+        """Score of ways to goals and on to the target, in cells, without what the goals promise to show."""
+        return -self.beta * (there * self.cell_m) - self.gamma * (beyond * self.cell_m)
 
     def _is_aside(self, point_m: Float) -> bool:
         return bool(self._aside_of(point_m[None])[0])
@@ -274,3 +287,8 @@ class Frontier:
         others = np.array([position_m for _, position_m in self._aside])
         away_m = np.linalg.norm(points_m[:, None] - others, axis=2)
         return np.asarray((away_m < self.aside_radius_m).any(axis=1))
+
+
+def _most(spare: float, weight: float) -> float:
+    """The largest cost that can be paid."""
+    return spare / weight if weight > 0.0 else math.inf

@@ -1,4 +1,4 @@
-"""Kernels on the planar map: graph distances, frontier cells, clusters, unknown counts."""
+"""Kernels on the planar map: frontier cells, their clusters and what to fly to in them, unknown counts."""
 
 from __future__ import annotations
 
@@ -6,152 +6,87 @@ import math
 
 import numba as nb
 import numpy as np
-from scipy import ndimage
 
-from uavexp.arrays import Bool, Float, Float32, Int, Int32, UInt8
+from uavexp.arrays import Bool, Float, Float32, Int, UInt8
 from uavexp.field import FREE, UNKNOWN, value_and_gradient
+from uavexp.mapping.projection import Part
 from uavexp.o3d import open3d
 
-_OFFSETS = np.array([(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)], dtype=np.int64)
-
-
-_UNIT = 100  # lengths are counted in hundredths of a cell: integers, so buckets serve as queue
-_DIAGONAL = 0.7071067811865476
-_BUCKETS = 1024  # > the longest step, 2 cells of the greatest cost
-
-
-@nb.njit(cache=True, inline="always")
-def _put_in(head: Int32, following: Int32, previous: Int32, slot: int, cell: int) -> None:
-    """Add a cell in front of a bucket's doubly linked list."""
-    previous[cell], following[cell] = -1, head[slot]
-    if head[slot] >= 0:
-        previous[head[slot]] = cell
-    head[slot] = cell
-
-
-@nb.njit(cache=True, inline="always")
-def _take_out(head: Int32, following: Int32, previous: Int32, slot: int, cell: int) -> None:
-    """Take a cell out of a bucket's list."""
-    if previous[cell] >= 0:
-        following[previous[cell]] = following[cell]
-    else:
-        head[slot] = following[cell]
-    if following[cell] >= 0:
-        previous[following[cell]] = previous[cell]
-
 
 @nb.njit(cache=True)
-def path_lengths(passable: Bool, cost: Int32, source: tuple[int, int], wanted: Int) -> Float32:
-    """Least cost (X, Y), in cells, from the source over passable cells, 8-connected.
+def mark_frontier(state: UInt8, inside: Part, parts: Int, frontier: Bool) -> None:
+    """Mark frontier cells (X, Y): free ones with an unknown 8-neighbour, both inside the flight bounds.
 
-    Exact at the `wanted` cells (N,), flat C-order indices: the search ends when it has them
-    all; elsewhere an upper bound. With none wanted it is exact everywhere.
-
-    A straight step costs the mean of both cells' `cost` (hundredths, 100 to 500), a
-    diagonal one sqrt(2) times that, rounded down to hundredths; no corner is cut: a diagonal
-    step needs both of its side cells passable. Unreached cells are inf. The source is
-    expanded even if it is not passable itself. Dijkstra (1959) with Dial's (1969) buckets.
+    Args:
+        state: (X, Y) of the planar map.
+        inside: the part within the flight bounds.
+        parts: (P, 4) that changed; the cells around them are looked at, too.
+        frontier: is written.
     """
-    nx, ny = passable.shape
-    far = np.int32(2**31 - 1)
-    length = np.full(nx * ny, far, dtype=np.int32)
-    following = np.full(nx * ny, -1, dtype=np.int32)  # bucket lists, doubly linked
-    previous = np.full(nx * ny, -1, dtype=np.int32)
-    head = np.full(_BUCKETS, -1, dtype=np.int32)
-    asked = np.zeros(nx * ny, dtype=np.bool_)
-    asked[wanted] = True
-    missing = np.count_nonzero(asked)
-    start = source[0] * ny + source[1]
-    length[start], head[0], waiting, now = 0, start, 1, 0
-    while waiting > 0:
-        slot = now % _BUCKETS
-        flat = head[slot]
-        if flat < 0:
-            now += 1
-            continue
-        _take_out(head, following, previous, slot, flat)
-        waiting -= 1
-        if asked[flat]:
-            missing -= 1
-            if missing == 0:
-                break
-        i, j = flat // ny, flat % ny
-        for n in range(8):
-            di, dj = _OFFSETS[n, 0], _OFFSETS[n, 1]
-            a, b = i + di, j + dj
-            if not (0 <= a < nx and 0 <= b < ny) or not passable[a, b]:
-                continue
-            both = cost[i, j] + cost[a, b]
-            if di != 0 and dj != 0:
-                if not (passable[a, j] and passable[i, b]):
-                    continue
-                step = int(both * _DIAGONAL)
-            else:
-                step = both // 2
-            near, there = a * ny + b, now + step
-            if there >= length[near]:
-                continue
-            if length[near] == far:
-                waiting += 1
-            else:
-                _take_out(head, following, previous, length[near] % _BUCKETS, near)
-            length[near] = there
-            _put_in(head, following, previous, there % _BUCKETS, near)
-    cells = np.empty((nx, ny), dtype=np.float32)
-    for flat in range(nx * ny):
-        cells[flat // ny, flat % ny] = np.inf if length[flat] == far else length[flat] / _UNIT
-    return cells
+    i0, i1, j0, j1 = inside
+    for n in range(parts.shape[0]):
+        for i in range(max(parts[n, 0] - 1, i0), min(parts[n, 1] + 1, i1)):
+            for j in range(max(parts[n, 2] - 1, j0), min(parts[n, 3] + 1, j1)):
+                borders = False
+                if state[i, j] == FREE:
+                    for a in range(max(i - 1, i0), min(i + 2, i1)):
+                        for b in range(max(j - 1, j0), min(j + 2, j1)):
+                            borders |= state[a, b] == UNKNOWN
+                frontier[i, j] = borders
 
 
 @nb.njit(cache=True)
-def frontier_cells(state: UInt8, inside: Bool) -> Bool:
-    """Frontier (X, Y): free cells with an unknown 8-neighbour, both inside the flight bounds."""
-    nx, ny = state.shape
-    frontier = np.zeros((nx, ny), dtype=np.bool_)
-    for i in range(nx):
-        for j in range(ny):
-            if state[i, j] != FREE or not inside[i, j]:
-                continue
-            for n in range(8):
-                a, b = i + _OFFSETS[n, 0], j + _OFFSETS[n, 1]
-                if 0 <= a < nx and 0 <= b < ny and inside[a, b] and state[a, b] == UNKNOWN:
-                    frontier[i, j] = True
-                    break
-    return frontier
+def connected_components(cells: Bool, index: Int) -> Int:
+    """Cluster (N,) of each of all set cells (X, Y): 8-connected, numbered in the order of their first cell.
+
+    Args:
+        cells: (X, Y).
+        index: (N, 2) of those set, in C order.
+    """
+    number = np.empty(cells.shape, dtype=np.int32)  # of each set cell in `index`
+    for n in range(index.shape[0]):
+        number[index[n, 0], index[n, 1]] = n
+    cluster, count = np.full(index.shape[0], -1, dtype=np.int64), 0
+    stack = np.empty(index.shape[0], dtype=np.int64)
+    for first in range(index.shape[0]):
+        if cluster[first] >= 0:
+            continue
+        cluster[first], stack[0], waiting = count, first, 1
+        while waiting > 0:
+            waiting -= 1
+            i, j = index[stack[waiting], 0], index[stack[waiting], 1]
+            for a in range(max(i - 1, 0), min(i + 2, cells.shape[0])):
+                for b in range(max(j - 1, 0), min(j + 2, cells.shape[1])):
+                    if cells[a, b] and cluster[number[a, b]] < 0:
+                        cluster[number[a, b]] = count
+                        stack[waiting] = number[a, b]
+                        waiting += 1
+        count += 1
+    return cluster
 
 
-def connected_components(cells: Bool) -> list[Int32]:
-    """Clusters, each (N, 2), of 8-connected cells, in the order of their first cell."""
-    label, count = ndimage.label(cells, structure=np.ones((3, 3)))
-    index = np.argwhere(cells).astype(np.int32)
-    member = label[cells]
-    return [index[member == n] for n in range(1, count + 1)]
-
-
-def density_clusters(cells: Bool, radius_cells: float, min_neighbours: int) -> list[Int32]:
-    """Clusters, each (N, 2), by DBSCAN (Ester et al. 1996, Open3D's); noise is left out."""
-    index = np.argwhere(cells).astype(np.int32)
+def density_clusters(index: Int, radius_cells: float, min_neighbours: int) -> Int:
+    """Cluster (N,) of each cell (N, 2) by DBSCAN (Ester et al. 1996, Open3D's); -1 of noise."""
     if len(index) == 0:
-        return []
+        return np.zeros(0, dtype=np.int64)
     cloud = open3d.geometry.PointCloud()
     cloud.points = open3d.utility.Vector3dVector(np.pad(index, ((0, 0), (0, 1))).astype(np.float64))
-    member = np.asarray(cloud.cluster_dbscan(eps=radius_cells, min_points=min_neighbours))
-    return [index[member == n] for n in range(member.max() + 1)]
+    member = cloud.cluster_dbscan(eps=radius_cells, min_points=min_neighbours)
+    return np.asarray(member, dtype=np.int64)
 
 
 @nb.njit(cache=True)
-def unknown_within(state: UInt8, inside: Bool, cells: Int, radius_cells: float) -> Int:
-    """Number (N,) of unknown cells inside the bounds around cells (N,), flat indices: J_info."""
-    nx, ny = state.shape
+def unknown_within(state: UInt8, inside: Part, cells: Int, radius_cells: float) -> Int:
+    """Number (N,) of unknown cells inside the bounds around cells (N, 2): J_info."""
+    i0, i1, j0, j1 = inside
     reach = int(radius_cells)
     count = np.zeros(cells.shape[0], dtype=np.int64)
     for n in range(cells.shape[0]):
-        x, y = cells[n] // ny, cells[n] % ny
-        for i in range(max(x - reach, 0), min(x + reach + 1, nx)):
-            for j in range(max(y - reach, 0), min(y + reach + 1, ny)):
+        x, y = cells[n, 0], cells[n, 1]
+        for i in range(max(x - reach, i0), min(x + reach + 1, i1)):
+            for j in range(max(y - reach, j0), min(y + reach + 1, j1)):
                 near = (i - x) ** 2 + (j - y) ** 2 <= radius_cells * radius_cells
-                if near and inside[i, j] and state[i, j] == UNKNOWN:
-                    count[n] += 1
+                count[n] += near and state[i, j] == UNKNOWN
     return count
 
 
@@ -194,59 +129,71 @@ def ascend(
 
 
 @nb.njit(cache=True)
-def split_long(cells: Int32, max_extent_cells: float) -> Int:
-    """Part (N,) of each cell (N, 2) of a cluster, halved along its principal axis until none is too long.
-
-    As in FUEL (Zhou et al. 2021): the centroid of a long curved frontier lies off it. Parts
-    are numbered from 0 in the order of the halving, lower half first.
-    """
-    count = cells.shape[0]
-    part = np.zeros(count, dtype=np.int64)
-    waiting = [0]  # parts still to be looked at, the next one last
-    used, done = 1, 0
-    final = np.full(count, -1, dtype=np.int64)
-    along = np.zeros(count)
-    while len(waiting) > 0:
-        now = waiting.pop()
-        size, x, y = 0, 0.0, 0.0
-        for n in range(count):
-            if part[n] == now:
-                size, x, y = size + 1, x + cells[n, 0], y + cells[n, 1]
-        x, y = x / size, y / size
-        xx = yy = xy = 0.0
-        for n in range(count):
-            if part[n] == now:
-                dx, dy = cells[n, 0] - x, cells[n, 1] - y
-                xx, yy, xy = xx + dx * dx, yy + dy * dy, xy + dx * dy
-        angle = 0.5 * math.atan2(2.0 * xy, xx - yy)  # principal direction of a 2x2 scatter matrix
-        low, high = np.inf, -np.inf
-        for n in range(count):
-            if part[n] == now:
-                along[n] = (cells[n, 0] - x) * math.cos(angle) + (cells[n, 1] - y) * math.sin(angle)
-                low, high = min(low, along[n]), max(high, along[n])
-        if high - low <= max_extent_cells or size < 2:
-            for n in range(count):
-                if part[n] == now:
-                    final[n] = done
-            done += 1
-            continue
-        for n in range(count):
-            if part[n] == now:
-                part[n] = used if along[n] <= 0.5 * (low + high) else used + 1
-        waiting.append(used + 1)
-        waiting.append(used)
-        used += 2
-    return final
+def _bisect(cells: Int, begin: int, end: int, max_extent_cells: float) -> int:
+    """Sort cells[begin:end] into the halves along their principal axis; where the second begins, or `end`."""
+    size, x, y = end - begin, 0.0, 0.0
+    for n in range(begin, end):
+        x, y = x + cells[n, 0], y + cells[n, 1]
+    x, y = x / size, y / size
+    xx = yy = xy = 0.0
+    for n in range(begin, end):
+        dx, dy = cells[n, 0] - x, cells[n, 1] - y
+        xx, yy, xy = xx + dx * dx, yy + dy * dy, xy + dx * dy
+    angle = 0.5 * math.atan2(2.0 * xy, xx - yy)  # principal direction of a 2x2 scatter matrix
+    along = (cells[begin:end, 0] - x) * math.cos(angle) + (cells[begin:end, 1] - y) * math.sin(angle)
+    low, high = along.min(), along.max()
+    if high - low <= max_extent_cells or size < 2:
+        return end
+    before, middle = cells[begin:end].copy(), begin
+    upper = along > 0.5 * (low + high)
+    for half in (False, True):
+        for n in range(size):
+            if upper[n] == half:
+                cells[middle] = before[n]
+                middle += 1
+    return end - int(upper.sum())
 
 
 @nb.njit(cache=True)
-def split_centroids(cells: Int32, max_extent_cells: float) -> Float:
-    """Mean cell (P, 2) of each part of a cluster (N, 2) that `split_long` makes."""
-    part = split_long(cells, max_extent_cells)
-    mean = np.zeros((part.max() + 1, 2))
-    size = np.zeros(part.max() + 1)
-    for n in range(cells.shape[0]):
-        size[part[n]] += 1
-        mean[part[n], 0] += cells[n, 0]
-        mean[part[n], 1] += cells[n, 1]
-    return mean / size.reshape(-1, 1)
+def split_long(cells: Int, max_extent_cells: float) -> Int:
+    """Ends (P,) of the parts of a cluster (N, 2), halved along its principal axis until none is too long.
+
+    As in FUEL (Zhou et al. 2021): the centroid of a long curved frontier lies off it. The cells are
+    sorted by part, lower half first.
+    """
+    ends = np.empty(cells.shape[0], dtype=np.int64)
+    waiting = [cells.shape[0]]  # ends of the parts still to be looked at, the next one last
+    begin, count = 0, 0
+    while len(waiting) > 0:
+        middle = _bisect(cells, begin, waiting[-1], max_extent_cells)
+        if middle < waiting[-1]:
+            waiting.append(middle)
+            continue
+        begin = ends[count] = waiting.pop()
+        count += 1
+    return ends[:count]
+
+
+@nb.njit(cache=True)
+def cluster_centroids(index: Int, cluster: Int, least_cells: int, max_extent_cells: float) -> Float:
+    """Mean cell (P, 2) of each part that `split_long` makes of each cluster that is large enough.
+
+    Args:
+        index: (N, 2) of cells, sorted by cluster.
+        cluster: (N,) of each, ascending; -1: none.
+        least_cells: of a cluster.
+        max_extent_cells: of a part.
+    """
+    mean, count, end = np.empty((index.shape[0], 2)), 0, 0
+    while end < index.shape[0]:
+        begin = end
+        while end < index.shape[0] and cluster[end] == cluster[begin]:
+            end += 1
+        if cluster[begin] < 0 or end - begin < least_cells:
+            continue
+        cells, first = index[begin:end].copy(), 0
+        for last in split_long(cells, max_extent_cells):
+            mean[count, 0] = cells[first:last, 0].sum() / (last - first)
+            mean[count, 1] = cells[first:last, 1].sum() / (last - first)
+            count, first = count + 1, last
+    return mean[:count]

@@ -1,90 +1,165 @@
-"""What one choice of a goal sees: the planar map, where the body fits, and path lengths over it."""
+"""What a choice of a goal sees: the planar map, its frontier, where the body fits, and ways over it.
+
+All of it is kept from one choice to the next and brought up to date where the map has changed.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from uavexp.arrays import Bool, Float, Float32, Int
-from uavexp.explorer.planar import path_lengths
-from uavexp.field import FREE, UNKNOWN
-from uavexp.mapping.projection import PlanarMap
+from uavexp.arrays import Bool, Float, Int, Int32, UInt8
+from uavexp.explorer.planar import mark_frontier
+from uavexp.explorer.waves import DIAGONAL, FAR, STRAIGHT, Wave, begin, forget, mark_kinds, new_wave, reach
+from uavexp.field import FREE, DistanceField
+from uavexp.mapping.projection import Band, Part, PlanarMap, Projection
+
+Cell = tuple[int, int]
 
 
-@dataclass(frozen=True, slots=True)
-class View:
-    """The planar map as one choice of a goal sees it."""
-
-    planar: PlanarMap
-    inside: Bool  # (X, Y) cells within the flight bounds
-    clear: Bool  # (X, Y) of these, where the body fits as far as is known
-    vehicle: tuple[int, int]
-
-    @property
-    def known(self) -> Bool:
-        """Clear cells known to be free (X, Y)."""
-        return np.asarray(self.clear & (self.planar.state == FREE))
-
-    def flat(self, points_m: Float) -> Int:
-        """Flat indices (N,) of the cells that hold points (N, 3)."""
-        index = np.floor((points_m[:, :2] - self.planar.origin_m) / self.planar.cell_m).astype(np.int64)
-        shape = np.array(self.planar.state.shape)
-        i, j = np.clip(index, 0, shape - 1).T
-        return np.asarray(i * shape[1] + j)
-
-    def lengths(self, passable: Bool, source: tuple[int, int], wanted: Int, unknown_cost: float) -> Float32:
-        """Path lengths (X, Y) from a cell, in cells, exact at the `wanted` ones that can be reached."""
-        wanted = wanted[passable.ravel()[wanted]]
-        if len(wanted) == 0:
-            return np.full(passable.shape, np.inf, dtype=np.float32)
-        dear = np.int32(round(100 * unknown_cost))
-        cost = np.where(self.planar.state == UNKNOWN, dear, np.int32(100))
-        found: Float32 = path_lengths(passable, cost, source, wanted)
-        return found
+def prices(unknown: float, occupied: float) -> Int32:
+    """What cells of each kind cost; a free one is the unit, 0: no way leads over them."""
+    return np.array([0, round(STRAIGHT * unknown), STRAIGHT, round(STRAIGHT * occupied)], dtype=np.int32)
 
 
-@dataclass(frozen=True, slots=True)
-class Search:
-    """Graph distances on one view, from the vehicle and from the target."""
-
-    view: View
-    from_vehicle: Float32  # (X, Y) path cost from the vehicle, over unknown cells too if optimistic, in cells
-    from_target: Float32  # (X, Y) with unknown as free, in cells; 0 without a target
-    target_known: bool  # whether known-free cells lead from the vehicle to the target
+KNOWN = prices(unknown=0.0, occupied=0.0)
+_OPTIMISTIC = prices(unknown=1.0, occupied=1.0)
 
 
-def view_of(
-    planar: PlanarMap, position_m: Float, flight_bounds_m: Float, clearance_m: float, escape_m: float
-) -> View:
-    """View of a planar map from a position.
+class Plane:
+    """The planar map of one field and its frontier.
 
     Args:
-        planar: the map.
-        position_m: (3,) of the vehicle.
-        flight_bounds_m: (2, 3).
-        clearance_m: that passable cells exceed.
-        escape_m: radius around the vehicle within which any clearance will do: nearer to an
-            obstacle than allowed, it must still find its way out.
+        field: the map.
+        band: what of it is projected.
+        bounds_m: (2, 3) of the flight.
     """
-    inside = _inside(planar, flight_bounds_m)
-    vehicle = planar.cell_of(position_m)
-    clear = inside & (planar.clearance > clearance_m)
-    clear |= inside & (planar.clearance > 0.0) & _within(planar, vehicle, escape_m)
-    return View(planar, inside, clear, vehicle)
+
+    __slots__ = ("_projection", "frontier", "inside", "map")
+
+    def __init__(self, field: DistanceField, band: Band, bounds_m: Float) -> None:
+        self._projection = Projection(field, band)
+        self.map: PlanarMap = self._projection.planar
+        rows, columns = (_within(self.map, axis, bounds_m[:, axis]) for axis in range(2))
+        self.inside: Part = (*rows, *columns)
+        self.frontier: Bool = np.zeros(self.map.state.shape, dtype=np.bool_)
+
+    @property
+    def field(self) -> DistanceField:
+        """The map."""
+        return self._projection.field
+
+    def update(self) -> Int:
+        """Bring it up to date; returns the parts (P, 4) that were."""
+        parts = self._projection.update()
+        mark_frontier(self.map.state, self.inside, parts, self.frontier)
+        return parts
+
+    def cells_of(self, points_m: Float) -> Int:
+        """Cells (N, 2) that hold points (N, 3); the nearest ones of those outside."""
+        index = np.floor((points_m[:, :2] - self.map.origin_m) / self.map.cell_m).astype(np.int64)
+        return np.asarray(np.clip(index, 0, np.array(self.map.state.shape) - 1))
 
 
-def _inside(planar: PlanarMap, bounds_m: Float) -> Bool:
-    nx, ny = planar.state.shape
-    x = planar.origin_m[0] + (np.arange(nx) + 0.5) * planar.cell_m
-    y = planar.origin_m[1] + (np.arange(ny) + 0.5) * planar.cell_m
-    within_x = (x >= bounds_m[0, 0]) & (x <= bounds_m[1, 0])
-    within_y = (y >= bounds_m[0, 1]) & (y <= bounds_m[1, 1])
-    inside: Bool = within_x[:, None] & within_y[None, :]
-    return inside
+def _within(planar: PlanarMap, axis: int, bounds_m: Float) -> tuple[int, int]:
+    """First row (or column) whose centre lies within bounds (2,), and the one behind the last."""
+    centre_m = planar.origin_m[axis] + (np.arange(planar.state.shape[axis]) + 0.5) * planar.cell_m
+    within = np.flatnonzero((centre_m >= bounds_m[0]) & (centre_m <= bounds_m[1]))
+    return (int(within[0]), int(within[-1]) + 1) if within.size else (0, 0)
 
 
-def _within(planar: PlanarMap, cell: tuple[int, int], radius_m: float) -> Bool:
-    i, j = np.ogrid[: planar.state.shape[0], : planar.state.shape[1]]
-    near: Bool = (i - cell[0]) ** 2 + (j - cell[1]) ** 2 <= (radius_m / planar.cell_m) ** 2
-    return near
+@dataclass(slots=True, kw_only=True)
+class Passage:
+    """Where a body passes on a plane, and the costs of ways there from the vehicle and from the target."""
+
+    plane: Plane
+    clearance_m: float  # that passable cells exceed ...
+    escape_m: (
+        float  # ... but for so far around the vehicle: too near to an obstacle, it must find its way out
+    )
+    target: Cell | None
+    vehicle: Cell = (0, 0)
+    _parts: list[Int] = field(default_factory=list)  # of the plane that changed and were not looked at yet
+    _kind: UInt8 = field(init=False)  # ((X + 2) (Y + 2),) not passable, unknown, free, occupied
+    _price: Int32 = field(init=False)  # of each kind on ways from the vehicle
+    _from_vehicle: Wave = field(init=False)
+    _from_target: Wave = field(init=False)
+
+    def __post_init__(self) -> None:
+        rows, columns = self.plane.map.state.shape
+        size = (rows + 2) * (columns + 2)
+        self._kind = np.zeros(size, dtype=np.uint8)
+        self._from_vehicle, self._from_target = new_wave(size), new_wave(size)
+        self._parts = [np.array([[0, rows, 0, columns]])]
+        if self.target is not None:
+            begin(self._from_target, self._flat(self.target), STRAIGHT)
+
+    def note(self, parts: Int) -> None:
+        """Take note of parts (P, 4) of the plane that changed."""
+        self._parts.append(parts)
+
+    def update(self, vehicle: Cell) -> None:
+        """Bring it up to date, with the vehicle in this cell."""
+        reach_cells = self.escape_m / self.plane.map.cell_m
+        around = [
+            _around(cell, int(reach_cells), self.plane.map.state.shape) for cell in (self.vehicle, vehicle)
+        ]
+        self.vehicle = vehicle
+        level = mark_kinds(
+            self.plane.map.state, self.plane.map.clearance, np.concatenate([*self._parts, np.array(around)]),
+            self.plane.inside, np.float32(self.clearance_m), vehicle, reach_cells**2, self._kind,
+            self._from_target,
+        )  # fmt: skip
+        self._parts.clear()
+        if level < FAR - 1:
+            forget(self._from_target, level)
+
+    def begin(self, price: Int32) -> None:
+        """Ask for ways from the vehicle over cells of these prices."""
+        own = price[1 + self.plane.map.state[self.vehicle]] or STRAIGHT
+        self._price = price
+        begin(self._from_vehicle, self._flat(self.vehicle), own)
+
+    def from_vehicle(self, cell: Cell, most: float = np.inf) -> float:
+        """Cost of the way to a cell, in cells; inf when there is none up to `most`."""
+        return self._cost(self._from_vehicle, self._price, cell, most)
+
+    def from_target(self, cell: Cell, most: float = np.inf) -> float:
+        """The same from the target, unknown counted as free; 0 without a target."""
+        return 0.0 if self.target is None else self._cost(self._from_target, _OPTIMISTIC, cell, most)
+
+    def knows_a_way(self, cell: Cell) -> bool:
+        """Whether cells known to be free lead from the vehicle to this one."""
+        if self._kind[self._flat(cell)] != 1 + FREE:
+            return False
+        self.begin(KNOWN)
+        return self.from_vehicle(cell) < np.inf
+
+    def _cost(self, wave: Wave, price: Int32, cell: Cell, most: float) -> float:
+        limit = int(min(STRAIGHT * most + 1.0, FAR))
+        cost = reach(wave, self._kind, self._width, price, self._flat(cell), limit)
+        return float(np.float32(cost / STRAIGHT)) if cost < FAR else np.inf
+
+    @property
+    def _width(self) -> int:
+        """Cells in a row, with the margin."""
+        return int(self.plane.map.state.shape[1]) + 2
+
+    def _flat(self, cell: Cell) -> int:
+        """Where a cell stands in a wave."""
+        return (cell[0] + 1) * self._width + cell[1] + 1
+
+
+def _around(cell: Cell, reach: int, shape: tuple[int, ...]) -> list[int]:
+    """The part of the plane so far around a cell."""
+    (i, j), (rows, columns) = cell, shape
+    return [max(i - reach, 0), min(i + reach + 1, rows), max(j - reach, 0), min(j + reach + 1, columns)]
+
+
+def straight(cells: Int, to: Cell) -> Float:
+    """Cost (N,) of the way from cells (N, 2) to another if nothing stood between, in cells."""
+    apart = np.abs(cells - np.array(to))
+    longer, shorter = apart.max(axis=1), apart.min(axis=1)
+    cost = STRAIGHT * (longer - shorter) + DIAGONAL * shorter
+    return np.asarray((cost / STRAIGHT).astype(np.float32), dtype=np.float64)
