@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import shlex
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,9 +14,12 @@ from uavexp.config.overrides import flatten, parse_settings, render
 from uavexp.errors import ConfigError
 from uavexp.log import TrialLog
 from uavexp.types import World
+from uavexp.world.base import WorldGenerator
 
 if TYPE_CHECKING:
     from uavexp.trial import Progress
+
+Keep = Callable[[WorldGenerator], WorldGenerator]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,8 +73,14 @@ def fly(*overrides: str, **values: Any) -> Trial:
     return fly_cell(command.cells[0], command.seeds[0])
 
 
-def fly_cell(cell: Cell, seed: int, progress: Progress | None = None) -> Trial:
+def fly_cell(cell: Cell, seed: int, progress: Progress | None = None, keep: Keep | None = None) -> Trial:
     """Build fresh components and fly one trial.
+
+    Args:
+        cell: what to fly.
+        seed: of the trial.
+        progress: called about once a simulated second.
+        keep: takes the world's generator and returns one that may know its world already.
 
     Raises:
         UavexpError: something the user can mend (the world cannot be made, no such device).
@@ -79,13 +89,20 @@ def fly_cell(cell: Cell, seed: int, progress: Progress | None = None) -> Trial:
     from uavexp.metrics.evaluate import evaluate
     from uavexp.trial import fly_trial
 
-    world, log = fly_trial(build(cell.config), seed, progress)
+    parts = build(cell.config)
+    parts = replace(parts, world=keep(parts.world)) if keep else parts
+    world, log = fly_trial(parts, seed, progress)
     metrics = evaluate(log, world, own_metrics(cell.metrics))
     return Trial(cell=cell, seed=seed, world=world, log=log, metrics=metrics)
 
 
-def check_world(cell: Cell, seed: int) -> None:
+def check_world(cell: Cell, seed: int, keep: Keep) -> None:
     """Make a cell's world once, so that a bad one is told before anything has flown.
+
+    Args:
+        cell: whose world.
+        seed: of the trial.
+        keep: as for `fly_cell`.
 
     Raises:
         WorldError: the world cannot be made or read.
@@ -94,7 +111,7 @@ def check_world(cell: Cell, seed: int) -> None:
 
     parts = build(cell.config)
     layout = seed if parts.world_seed is None else parts.world_seed
-    parts.world.generate(generator(layout, Stream.WORLD))
+    keep(parts.world).generate(generator(layout, Stream.WORLD))
 
 
 def repeat_command(cell: Cell, seed: int, user_folder: Path | None = None) -> str:

@@ -13,7 +13,7 @@ import zipfile
 import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import IO, Any, get_type_hints
 
 import numpy as np
 import numpy.typing as npt
@@ -89,8 +89,8 @@ def pack(arrays: Mapping[str, npt.NDArray[Any]]) -> bytes:
     return packed.getvalue()
 
 
-def unpack(path: Path) -> Arrays:
-    """Arrays of an npz file.
+def unpack(path: Path | IO[bytes]) -> Arrays:
+    """Arrays of an npz file, or of an open one.
 
     Raises:
         RecordError: missing or damaged.

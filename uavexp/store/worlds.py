@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
@@ -35,8 +35,8 @@ def is_whole(path: Path) -> bool:
     return True
 
 
-def read_world(path: Path) -> World:
-    """Read a world back.
+def read_world(path: Path | IO[bytes]) -> World:
+    """Read a world back, from its file or an open one.
 
     Raises:
         RecordError: missing, damaged, or no world.

@@ -167,7 +167,7 @@ def _check_worlds(asked: Sequence[TrialJob]) -> None:
         if world not in checked:
             checked.append(world)
             try:
-                check_world(trial.cell, trial.seed)
+                check_world(trial.cell, trial.seed, trial.keep_world)
             except UavexpError:
                 raise
             except Exception as error:

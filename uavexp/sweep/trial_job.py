@@ -12,8 +12,10 @@ from uavexp.errors import RecordError
 from uavexp.flight import Trial, fly_cell
 from uavexp.store.outputs import failure_files, trial_files
 from uavexp.store.records import PICTURE, code_digest, lock_digest
+from uavexp.store.world_cache import kept
 from uavexp.store.worlds import is_whole, world_bytes
 from uavexp.sweep.job import Answer, Job, Progress
+from uavexp.world.base import WorldGenerator
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,6 +29,12 @@ class TrialJob:
     command: str  # that repeats it
     worlds: Path  # where worlds are kept that need not be sent again
     picture: bool  # draw it also when it succeeds
+
+    def keep_world(self, generator: WorldGenerator) -> WorldGenerator:
+        """The generator of its world, which draws it once for all trials in it."""
+        config = self.identity["config"]
+        layout = self.seed if config["world_seed"] is None else config["world_seed"]
+        return kept(generator, config["world"], layout, self.version)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,7 +51,7 @@ class Flown:
 def fly_job(asked: TrialJob, progress: Progress) -> Flown:
     """Fly one trial and return its files; nothing is written here."""
     begin_s = time.perf_counter()
-    trial = fly_cell(asked.cell, asked.seed, progress)
+    trial = fly_cell(asked.cell, asked.seed, progress, asked.keep_world)
     wall = {"command": asked.command, "wall_trial_s": time.perf_counter() - begin_s}
     digest, success = trial.world.digest, bool(trial.metrics["success"])
     known = is_whole(asked.worlds / f"{digest}.npz")
