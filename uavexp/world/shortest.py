@@ -1,7 +1,7 @@
 """Exact shortest lattice paths among triangles (numba).
 
 Nodes are the centres of cubes that fill the flight bounds; a node is passable when no
-triangle comes nearer than `radius`. Nodes are tested only when the search reaches them.
+triangle comes nearer than `radius`.
 
 Clearance between nodes: for a point o and the midpoint m of a and b with |a - b| = 2h,
 |m - o|² = (|a - o|² + |b - o|²)/2 - h². So balls of radius² = clearance² + h² free of
@@ -18,10 +18,10 @@ import numba as nb
 import numpy as np
 
 from uavexp.arrays import Bool, Float, Int, Int32, UInt8
-from uavexp.triangle_grid import TriangleGrid, ball_meets_mesh, box_meets_mesh
+from uavexp.triangle_grid import TriangleGrid, ball_meets_mesh, box_meets_mesh, squared_distance_to_triangle
 from uavexp.world.line_of_sight import in_sight
 
-_UNTESTED, _BLOCKED, _PASSABLE, _PASSABLE_END = 0, 1, 2, 3
+_BLOCKED, _PASSABLE, _PASSABLE_END = 0, 1, 2
 
 
 class Nodes(NamedTuple):
@@ -98,14 +98,31 @@ def _flat(nodes: Nodes, i: int, j: int, k: int) -> int:
 
 
 @nb.njit(cache=True)
-def _is_passable(nodes: Nodes, tested: UInt8, flat: int, point: Float) -> bool:
-    if tested[flat] == _UNTESTED:
-        tested[flat] = _BLOCKED if ball_meets_mesh(nodes.grid, point, nodes.radius) else _PASSABLE
-    return bool(tested[flat] >= _PASSABLE)
+def passable_nodes(nodes: Nodes) -> UInt8:
+    """Which nodes, in flat order, are passable: triangle by triangle, those near it are not."""
+    kind = np.full(nodes.shape[0] * nodes.shape[1] * nodes.shape[2], _PASSABLE, dtype=np.uint8)
+    first, last, point = np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64), np.empty(3)
+    for item in range(nodes.grid.corners_m.shape[0]):
+        corner = nodes.grid.corners_m[item]
+        for axis in range(3):  # the nodes within the radius of its box, and a rounding
+            low = (corner[:, axis].min() - nodes.radius - nodes.low[axis]) / nodes.cell - 0.5
+            high = (corner[:, axis].max() + nodes.radius - nodes.low[axis]) / nodes.cell - 0.5
+            first[axis] = max(math.ceil(low - 1e-9), 0)
+            last[axis] = min(math.floor(high + 1e-9), nodes.shape[axis] - 1)
+        for i in range(first[0], last[0] + 1):
+            for j in range(first[1], last[1] + 1):
+                row = (i * nodes.shape[1] + j) * nodes.shape[2]
+                for k in range(first[2], last[2] + 1):
+                    if kind[row + k] == _BLOCKED:
+                        continue
+                    _put(nodes, i, j, k, point)
+                    if squared_distance_to_triangle(corner, point) < nodes.radius**2:
+                        kind[row + k] = _BLOCKED
+    return kind
 
 
 @nb.njit(cache=True)
-def _entries(nodes: Nodes, clearance: float, tested: UInt8, end: Float) -> tuple[Int, Float]:
+def _entries(nodes: Nodes, clearance: float, kind: UInt8, end: Float) -> tuple[Int, Float]:
     """Nodes around an end point that can be flown to straight, ascending, and how far each is.
 
     The node at the point itself when there is one; else those within two cells.
@@ -121,11 +138,9 @@ def _entries(nodes: Nodes, clearance: float, tested: UInt8, end: Float) -> tuple
         for j in range(base[1] - 2, base[1] + 3):
             for k in range(base[2] - 2, base[2] + 3):
                 flat = _flat(nodes, i, j, k)
-                if flat < 0:
+                if flat < 0 or kind[flat] == _BLOCKED:
                     continue
                 _put(nodes, i, j, k, point)
-                if not _is_passable(nodes, tested, flat, point):
-                    continue
                 hop = math.sqrt(
                     (point[0] - end[0]) ** 2 + (point[1] - end[1]) ** 2 + (point[2] - end[2]) ** 2
                 )
@@ -138,21 +153,7 @@ def _entries(nodes: Nodes, clearance: float, tested: UInt8, end: Float) -> tuple
 
 
 @nb.njit(cache=True)
-def _column_is_passable(nodes: Nodes, tested: UInt8, i: int, j: int, middle: int) -> bool:
-    """Whether any node of a column is passable; those near the level `middle` are asked first."""
-    point = np.empty(3)
-    for away in range(2 * nodes.shape[2]):
-        k = middle + (away + 1) // 2 * (1 if away % 2 == 0 else -1)
-        flat = _flat(nodes, i, j, k)
-        if flat >= 0:
-            _put(nodes, i, j, k, point)
-            if _is_passable(nodes, tested, flat, point):
-                return True
-    return False
-
-
-@nb.njit(cache=True)
-def _column_bound(nodes: Nodes, tested: UInt8, starts: Int, ends: Int) -> Float:
+def _column_bound(nodes: Nodes, kind: UInt8, starts: Int, ends: Int) -> Float:
     """Lower bound (X * Y,) of the path length from each column to the nearest end node.
 
     Dijkstra over columns that hold a passable node, 8-connected, from the ends until every
@@ -173,7 +174,6 @@ def _column_bound(nodes: Nodes, tested: UInt8, starts: Int, ends: Int) -> Float:
     for column in starts // high:
         wanted[column] = True
     missing = wanted.sum()
-    middle = starts[0] % high
     stopped = np.inf
     while len(heap) > 0 and missing > 0:
         stopped, _, column = heapq.heappop(heap)
@@ -188,7 +188,7 @@ def _column_bound(nodes: Nodes, tested: UInt8, starts: Int, ends: Int) -> Float:
                     continue
                 near = (i + di) * wide + j + dj
                 longer = bound[column] + nodes.cell * math.sqrt(float(di * di + dj * dj))
-                if longer < bound[near] and _column_is_passable(nodes, tested, i + di, j + dj, middle):
+                if longer < bound[near] and kind[near * high : (near + 1) * high].any():
                     bound[near] = longer
                     heapq.heappush(heap, (longer, 0.0, near))
     return np.where(closed, bound, np.inf if missing > 0 else stopped)
@@ -212,17 +212,17 @@ def shortest_lattice_path(nodes: Nodes, clearance: float, start: Float, target: 
     Returns:
         The path, ends included; (0, 3) when there is none.
     """
-    tested = np.zeros(nodes.shape[0] * nodes.shape[1] * nodes.shape[2], dtype=np.uint8)
-    ends, end_hops = _entries(nodes, clearance, tested, target)
-    starts, start_hops = _entries(nodes, clearance, tested, start)
+    kind = passable_nodes(nodes)
+    ends, end_hops = _entries(nodes, clearance, kind, target)
+    starts, start_hops = _entries(nodes, clearance, kind, start)
     if starts.shape[0] == 0 or ends.shape[0] == 0:
         return np.empty((0, 3))
-    bound = _column_bound(nodes, tested, starts, ends)
+    bound = _column_bound(nodes, kind, starts, ends)
     if bound[starts[0] // nodes.shape[2]] == np.inf:
         return np.empty((0, 3))
     for flat in ends:
-        tested[flat] = _PASSABLE_END
-    parent = _search(nodes, tested, bound, starts, start_hops, ends, end_hops, target)
+        kind[flat] = _PASSABLE_END
+    parent = _search(nodes, kind, bound, starts, start_hops, ends, end_hops, target)
     if parent[-1] < 0:
         return np.empty((0, 3))
     path: Float = _trace(nodes, parent, start, target)
@@ -231,21 +231,26 @@ def shortest_lattice_path(nodes: Nodes, clearance: float, start: Float, target: 
 
 @nb.njit(cache=True)
 def _search(
-    nodes: Nodes, tested: UInt8, bound: Float, starts: Int, start_hops: Float, ends: Int, end_hops: Float,
+    nodes: Nodes, kind: UInt8, bound: Float, starts: Int, start_hops: Float, ends: Int, end_hops: Float,
     target: Float,
 ) -> Int32:  # fmt: skip
     """Parent (size + 1,) of each node that the search reached, -1 of the others; the last is the target."""
-    size = np.int64(tested.shape[0])
+    size = np.int64(kind.shape[0])
     cost = np.full(size + 1, np.inf)
     parent = np.full(size + 1, -1, dtype=np.int32)
-    closed = np.zeros(size + 1, dtype=np.bool_)
+    closed = np.append(kind == _BLOCKED, False)
+    # numbers of their own: to hand `nodes` on costs more than to use them
+    (deep, wide, high), (low_x, low_y, low_z), cell = nodes.shape, nodes.low, nodes.cell
+    edge = np.empty(27)
+    for step in range(27):
+        apart = (step // 9 - 1) ** 2 + (step // 3 % 3 - 1) ** 2 + (step % 3 - 1) ** 2
+        edge[step] = cell * math.sqrt(float(apart))
     slack = 0.14 * end_hops.max()  # octile is at most 1.14 times the straight distance
     heap = [(0.0, 0.0, np.int64(-1))]
     heap.pop()
     for n in range(starts.shape[0]):
         cost[starts[n]] = start_hops[n]
         heapq.heappush(heap, (start_hops[n], 0.0, starts[n]))
-    point = np.empty(3)
     while len(heap) > 0:
         _, _, flat = heapq.heappop(heap)
         if closed[flat]:
@@ -253,28 +258,26 @@ def _search(
         closed[flat] = True
         if flat == size:
             break
-        if tested[flat] == _PASSABLE_END:
+        if kind[flat] == _PASSABLE_END:
             hop = end_hops[np.searchsorted(ends, flat)]
             if cost[flat] + hop < cost[size]:
                 cost[size] = cost[flat] + hop
                 parent[size] = flat
                 heapq.heappush(heap, (float(cost[size]), 0.0, size))
-        i, j, k = _index(nodes, flat)
+        i, j, k = flat // (wide * high), flat // high % wide, flat % high
         for step in range(27):
-            di, dj, dk = step // 9 - 1, step // 3 % 3 - 1, step % 3 - 1
-            near = _flat(nodes, i + di, j + dj, k + dk)
-            if near < 0 or closed[near]:
+            x, y, z = i + step // 9 - 1, j + step // 3 % 3 - 1, k + step % 3 - 1
+            near = (x * wide + y) * high + z
+            if not (0 <= x < deep and 0 <= y < wide and 0 <= z < high) or closed[near]:
                 continue
-            longer = cost[flat] + nodes.cell * math.sqrt(float(di * di + dj * dj + dk * dk))
+            longer = cost[flat] + edge[step]
             if longer >= cost[near]:
-                continue
-            _put(nodes, i + di, j + dj, k + dk, point)
-            if not _is_passable(nodes, tested, near, point):
                 continue
             cost[near] = longer
             parent[near] = flat
-            ahead = _octile(point[0] - target[0], point[1] - target[1], point[2] - target[2])
-            ahead = max(ahead - slack, bound[near // nodes.shape[2]])
+            place = low_x + (x + 0.5) * cell, low_y + (y + 0.5) * cell, low_z + (z + 0.5) * cell
+            ahead = _octile(place[0] - target[0], place[1] - target[1], place[2] - target[2])
+            ahead = max(ahead - slack, bound[near // high])
             heapq.heappush(heap, (longer + ahead, ahead, np.int64(near)))
     return parent
 

@@ -12,7 +12,7 @@ from uavexp.scene import Scene
 from uavexp.world import task
 from uavexp.world.boxes import Boxes
 from uavexp.world.line_of_sight import in_sight
-from uavexp.world.shortest import make_nodes, shortest_lattice_path
+from uavexp.world.shortest import make_nodes, passable_nodes, shortest_lattice_path
 
 BOUNDS = np.array([[0.0, 0.0, 0.0], [4.0, 3.0, 1.2]])
 
@@ -47,6 +47,17 @@ def graph_shortest(scene: Scene, cell: float, radius: float, start: int, target:
         (np.concatenate(costs), (np.concatenate(rows), np.concatenate(columns))), shape=(flat.size,) * 2
     ).tocsr()
     return float(dijkstra(graph, indices=start)[target])
+
+
+@pytest.mark.parametrize("radius", [0.07, 0.15, 0.4])
+def test_a_node_is_passable_when_nothing_comes_nearer_than_the_radius(radius: float) -> None:
+    scene = cluttered(7)
+    nodes = make_nodes(scene.grid, BOUNDS, 0.1, radius)
+    index = np.indices(nodes.shape).reshape(3, -1).T
+    distance_m = scene.distance_m(BOUNDS[0] + (index + 0.5) * 0.1)
+    clear = np.abs(distance_m - radius) > 1e-6  # of the distance's own rounding
+    np.testing.assert_array_equal(passable_nodes(nodes)[clear] > 0, distance_m[clear] > radius)
+    assert 0 < np.count_nonzero(distance_m > radius) < len(index)
 
 
 @pytest.mark.parametrize("seed", range(6))
