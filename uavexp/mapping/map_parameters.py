@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
+import numpy as np
+
 from uavexp.arrays import Float
 from uavexp.errors import require
 from uavexp.mapping.esdf import distance_table
@@ -64,11 +66,11 @@ class MapParameters(FieldParameters):
     def rule(self) -> FusionRule:
         """Return the fusion and occupancy rule in the form that kernels take."""
         return FusionRule(
-            truncation_m=self.truncation_m,
+            truncation_m=np.float32(self.truncation_m),
             max_weight=self.max_weight,
-            occupied_below_m=self.occupied_below_m,
-            free_above_m=self.free_above_m,
-            solid_depth_m=self.solid_depth_m,
+            occupied_below_m=np.float32(self.occupied_below_m),
+            free_above_m=np.float32(self.free_above_m),
+            solid_depth_m=np.float32(self.solid_depth_m),
             hit_evidence=self.hit_evidence,
             miss_evidence=self.miss_evidence,
             occupied_evidence=self.occupied_evidence,

@@ -51,11 +51,11 @@ _BYTES_PER_VOXEL = 26  # of a voxel that was seen: TSDF and state 7, ESDF 19; li
 class FusionRule(NamedTuple):
     """The fusion and occupancy rule in the form that kernels take; see the module's text."""
 
-    truncation_m: float
+    truncation_m: np.float32
     max_weight: int
-    occupied_below_m: float
-    free_above_m: float
-    solid_depth_m: float
+    occupied_below_m: np.float32
+    free_above_m: np.float32
+    solid_depth_m: np.float32
     hit_evidence: int
     miss_evidence: int
     occupied_evidence: int
@@ -76,12 +76,8 @@ class Voxels(NamedTuple):
 @nb.njit(cache=True, inline="always")
 def keeps_free(observed_m: float, fused_m: float, weight: int, byte: int, rule: FusionRule) -> bool:
     """Whether an observation from behind a surface must not touch a voxel measured to be free."""
-    return (
-        observed_m < -rule.free_above_m
-        and fused_m > rule.free_above_m
-        and weight >= 2
-        and (byte >> _EVIDENCE) == 0
-    )
+    measured_free = (fused_m > rule.free_above_m) & (weight >= 2) & ((byte >> _EVIDENCE) == 0)
+    return bool(measured_free & (observed_m < -rule.free_above_m))
 
 
 @nb.njit(cache=True, inline="always")
@@ -89,21 +85,28 @@ def judge(
     observed_m: float, fused_before_m: float, weight_before: int, fused_m: float, byte: int, rule: FusionRule
 ) -> int:
     """Return a voxel's byte after one observation: evidence and state moved, list bit kept."""
-    agrees = weight_before == 0 or abs(observed_m - fused_before_m) <= rule.free_above_m
+    agrees = (weight_before == 0) | (abs(observed_m - fused_before_m) <= rule.free_above_m)
     judged = fused_m if agrees else observed_m
-    if judged < -rule.solid_depth_m:
-        return byte
-    evidence = byte >> _EVIDENCE
-    state = byte & _STATE
-    if judged < rule.occupied_below_m:
-        evidence = min(evidence + rule.hit_evidence, rule.max_evidence)
-    elif judged > rule.free_above_m or state != OCCUPIED:
-        evidence = max(evidence - rule.miss_evidence, 0)
-    if evidence >= rule.occupied_evidence:
-        state = OCCUPIED
-    elif evidence == 0:
-        state = FREE
-    return (evidence << _EVIDENCE) | (byte & _LISTED) | state
+    evidence, state = byte >> _EVIDENCE, byte & _STATE
+    hit = min(evidence + rule.hit_evidence, rule.max_evidence)
+    missed = (judged > rule.free_above_m) | (state != OCCUPIED)
+    miss = max(evidence - rule.miss_evidence, 0) if missed else evidence
+    evidence = hit if judged < rule.occupied_below_m else miss
+    state = OCCUPIED if evidence >= rule.occupied_evidence else (FREE if evidence == 0 else state)
+    return (evidence << _EVIDENCE) | (byte & _LISTED) | state if judged >= -rule.solid_depth_m else byte
+
+
+@nb.njit(cache=True, error_model="numpy", inline="always")
+def fuse(
+    observed_m: np.float32, before_m: np.float32, weight: int, byte: int, rule: FusionRule
+) -> tuple[np.float32, int, int]:
+    """Distance, weight and byte of a voxel after one observation (-inf: none), without a branch."""
+    told = (observed_m > -np.inf) & (not keeps_free(observed_m, before_m, weight, byte, rule))
+    had = np.float32(weight)
+    after_m = (had * before_m + observed_m) / (had + np.float32(1.0))
+    moved = judge(observed_m, before_m, weight, after_m, byte, rule)
+    more = min(weight + 1, rule.max_weight)
+    return after_m if told else before_m, more if told else weight, moved if told else byte
 
 
 @nb.njit(cache=True, inline="always")
@@ -114,26 +117,6 @@ def enlist(voxels: Voxels, at: int, byte: int, count: int) -> int:
         voxels.changes[count] = at
         count += 1
     voxels.live[at] = byte
-    return count
-
-
-@nb.njit(cache=True)
-def reciprocals(rule: FusionRule) -> Float:
-    """1 / (w + 1) of every weight w."""
-    return 1.0 / np.arange(1, rule.max_weight + 2)
-
-
-@nb.njit(cache=True, inline="always")
-def observe(voxels: Voxels, at: int, observed: float, rule: FusionRule, reciprocal: Float, count: int) -> int:
-    """Fuse and judge one observation of a voxel, m; returns the new count of changes."""
-    before, had, byte = voxels.tsdf_m[at], np.int64(voxels.weight[at]), np.int64(voxels.live[at])
-    if not keeps_free(observed, before, had, byte, rule):
-        fused = (had * before + observed) * reciprocal[had]
-        voxels.tsdf_m[at] = fused
-        voxels.weight[at] = np.uint8(had + (had < rule.max_weight))
-        after = judge(observed, before, had, fused, byte, rule)
-        if after != byte:
-            count = enlist(voxels, at, after, count)
     return count
 
 

@@ -20,7 +20,7 @@ import numba as nb
 import numpy as np
 
 from uavexp.arrays import Float, Float32, Int32
-from uavexp.mapping.occupancy import FusionRule, OccupancyMap, Voxels, observe, reciprocals
+from uavexp.mapping.occupancy import FusionRule, OccupancyMap, Voxels, enlist, fuse
 from uavexp.scan import RayScan
 
 _INSIDE = 1e-6  # voxels before the grid's border: rounding must not lead out of it
@@ -206,12 +206,15 @@ def _fuse(
     voxels: Voxels, nearest: Float32, touched: Int32, voxel_m: float, rule: FusionRule, count: int
 ) -> int:
     """Fuse the observations and clear them; returns how many voxels now stand in `changes`."""
-    reciprocal = reciprocals(rule)
     for n in range(touched.shape[0]):
         at = touched[n]
-        observed = nearest[at] * voxel_m
+        observed_m, byte = np.float32(nearest[at] * voxel_m), np.int64(voxels.live[at])
         nearest[at] = np.inf
-        count = observe(voxels, at, observed, rule, reciprocal, count)
+        voxels.tsdf_m[at], voxels.weight[at], after = fuse(
+            observed_m, voxels.tsdf_m[at], np.int64(voxels.weight[at]), byte, rule
+        )
+        if after != byte:
+            count = enlist(voxels, at, after, count)
     return count
 
 
