@@ -106,8 +106,8 @@ class Panel:
         if metric.column not in self._samples:
             asked = self.together if metric in self.together else (metric,)
             there = [item for item in dict.fromkeys(asked) if self.has(item)]
-            block = np.concatenate([self.block(item) for item in there], axis=1)
-            parts = np.split(statistics.resampled_means(block, self.cluster), len(there), axis=1)
+            blocks = [self.block(item) for item in there]
+            parts = np.split(statistics.resampled_means(blocks, self.cluster), len(there), axis=1)
             self._samples.update(zip((item.column for item in there), parts, strict=True))
         return self._samples[metric.column]
 
@@ -201,8 +201,9 @@ class Pairs:
     @cached_property
     def samples(self) -> dict[str, Float]:
         """Resampled mean differences (B,) of every metric, all resampled together."""
-        block = np.stack([values[:, 0] - values[:, 1] for values in self.columns.values()], axis=1)
-        return dict(zip(self.columns, statistics.resampled_means(block, self.cluster).T, strict=True))
+        differences = [values[:, :1] - values[:, 1:] for values in self.columns.values()]
+        means = statistics.resampled_means(differences, self.cluster)
+        return dict(zip(self.columns, means.T, strict=True))
 
 
 def pairs_of(

@@ -52,9 +52,9 @@ def make_report(folder: Path, say: Say = lambda line: None, warn: Say | None = N
     """
     study = read_study(folder)
     _bring_up_to_date(study, say)
-    if study.trials.empty:
+    if study.measurements.empty:
         raise RecordError(f"{folder} holds no trial yet")
-    say(f"{len(study.trials)} trials: tables")
+    say(f"{len(study.measurements)} trials: tables")
     report = Report(study=study)
     files = [*_write_tables(report, folder), *_write_figures_and_page(report, say, warn or say)]
     _remove_stale(folder, files)

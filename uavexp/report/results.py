@@ -134,7 +134,7 @@ class Results:
     @cached_property
     def notes(self) -> tuple[str, ...]:
         """Sentences below every table: seeds, scenes, how unknown space is planned through."""
-        trials, scenes = self.study.trials, self.panel.scenes
+        trials, scenes = self.study.measurements, self.panel.scenes
         seeds = np.sort(trials["seed"].unique())
         among = f" in {len(scenes)} scenes" if len(scenes) > 1 else ""
         notes = [f"{len(trials)} trials{among}, {seeds.size} seeds ({seeds[0]} to {seeds[-1]})."]

@@ -9,7 +9,7 @@ the success rate, for which such a trial is a failure.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -113,7 +113,7 @@ def rate_interval(success: Bool, cluster: Labels, level: float = LEVEL) -> Inter
 
 
 def resampled_means(
-    values: Float, cluster: Labels, *, resamples: int | None = None, seed: int = SEED
+    blocks: Sequence[Float], cluster: Labels, *, resamples: int | None = None, seed: int = SEED
 ) -> Float:
     """Means of resampled trials: scenes drawn with replacement, then rows within each of them.
 
@@ -121,7 +121,8 @@ def resampled_means(
     pairing by seed.
 
     Args:
-        values: (N, C) one row per scene and seed; NaN where a value does not exist.
+        blocks: each (N, ...) one row per scene and seed, C columns in all; NaN where a value does not
+            exist. They are put side by side one scene at a time.
         cluster: (N,) scene of each row; with a single scene only its rows are resampled.
         resamples: number B of resamples; by default 4000, or 2000 of more than 10,000 rows.
         seed: of the generator.
@@ -131,18 +132,21 @@ def resampled_means(
 
     Source: Davison and Hinkley 1997, "Bootstrap methods and their application", section 3.8.
     """
-    columns = values.shape[1]
-    resamples = resamples or (RESAMPLES if len(values) <= _MANY_ROWS else RESAMPLES_OF_MANY)
-    exists = np.isfinite(values)
-    sums_and_counts = np.concatenate([np.where(exists, values, 0.0), exists], axis=1)
+    columns = sum(block.shape[1] for block in blocks)
+    resamples = resamples or (RESAMPLES if len(cluster) <= _MANY_ROWS else RESAMPLES_OF_MANY)
     index = np.unique(cluster, return_inverse=True)[1]
     clusters = int(index.max()) + 1 if index.size else 0
     rng = np.random.default_rng(seed)
     chosen = rng.integers(max(clusters, 1), size=(resamples, clusters))
     total = np.zeros((resamples, 2 * columns))
     for scene in range(clusters):
-        rows = sums_and_counts[index == scene]
+        values = np.concatenate([block[index == scene] for block in blocks], axis=1)
+        exists = np.isfinite(values)
+        rows = np.concatenate([np.where(exists, values, 0.0), exists], axis=1)
         times = (chosen == scene).sum(axis=1)
+        if len(rows) > _MANY_ROWS:
+            total += _limit_of_resampled_sums(rows, times, rng)
+            continue
         for some in _batches(resamples, len(rows)):
             total[some] += _resampled_sums(rows, times[some], rng)
     with np.errstate(invalid="ignore"):
@@ -161,6 +165,18 @@ def _resampled_sums(rows: Float, times: npt.NDArray[np.int64], rng: np.random.Ge
     draw += np.repeat(n * np.arange(times.size), times * n)
     weights = np.bincount(draw, minlength=times.size * n).reshape(times.size, n)
     return np.asarray(weights.astype(float) @ rows)
+
+
+def _limit_of_resampled_sums(rows: Float, times: npt.NDArray[np.int64], rng: np.random.Generator) -> Float:
+    """The same over very many rows, drawn from the normal distribution that such sums then have.
+
+    Its covariance is `times[b]` n times that of the rows, Rᵀ R / n with R of their QR decomposition, which
+    leaves a column of equal values without any spread.
+    """
+    mean, times = rows.mean(axis=0), times[:, None]
+    factor = np.linalg.qr(rows - mean, mode="r")
+    spread = rng.standard_normal((times.size, len(factor))) @ factor
+    return np.asarray(times * len(rows) * mean + np.sqrt(times) * spread)
 
 
 def percentile_interval(samples: Float, units: int, level: float = LEVEL) -> tuple[Float, Float]:
@@ -215,6 +231,6 @@ def mean_interval(values: Float, cluster: Labels, level: float = LEVEL) -> Inter
     Source: `resampled_means` and `percentile_interval`.
     """
     exists = np.isfinite(values)
-    samples = resampled_means(values[exists, None], cluster[exists])
+    samples = resampled_means([values[exists, None]], cluster[exists])
     low, high = percentile_interval(samples, units_of(cluster[exists]), level)
     return Interval(float(low[0]), float(high[0]))

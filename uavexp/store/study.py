@@ -15,7 +15,7 @@ so that a trial repeated by itself has the same record.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -44,6 +44,7 @@ if TYPE_CHECKING:
 STUDY, RUN = "study.json", "run.json"
 TRIALS, WORLDS = "trials", "worlds"
 ASIDE = ".aside-"
+_REPORTED = ("p_trigger_", "p_planner_unknown")  # parameters that figures and notes show
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,6 +77,13 @@ class Study:
     def trials(self) -> pd.DataFrame:
         """One row per trial (columns in `uavexp.store.table`), axes as plain text columns."""
         return _read(self.folder / TABLE)
+
+    @cached_property
+    def measurements(self) -> pd.DataFrame:
+        """The columns of `trials` that reports read: all but the parameters of most groups."""
+        return _read(
+            self.folder / TABLE, lambda name: not name.startswith("p_") or name.startswith(_REPORTED)
+        )
 
     @cached_property
     def replans(self) -> pd.DataFrame:
@@ -209,11 +217,13 @@ def _unsealed(file: Path) -> dict[str, Any]:
     return content if isinstance(content, dict) else {}
 
 
-def _read(file: Path) -> pd.DataFrame:
+def _read(file: Path, wanted: Callable[[str], bool] = lambda name: True) -> pd.DataFrame:
     from pyarrow import ArrowException, parquet
 
     try:
-        table: pd.DataFrame = parquet.read_table(file, page_checksum_verification=True).to_pandas()
-        return table
+        columns = [name for name in parquet.read_schema(file).names if wanted(name)]
+        table = parquet.read_table(file, columns=columns, page_checksum_verification=True)
+        frame: pd.DataFrame = table.to_pandas(split_blocks=True, self_destruct=True)
+        return frame
     except (OSError, ArrowException) as error:
         raise RecordError(f"{file}: cannot be read ({error})") from error

@@ -84,7 +84,7 @@ def study_of(trials: pd.DataFrame, report: dict[str, Any] | None = None, **setti
         seeds=(0, 1),
         settings={"primary": "MCR", "time_based": "TBR", **settings},
     )
-    study.__dict__["trials"] = trials  # what the folder would hold
+    study.__dict__["measurements"] = trials  # what the folder would hold
     return study
 
 
@@ -395,7 +395,7 @@ def disturbed(noisy_false_triggers: int) -> Study:
 
 def test_false_triggers_are_map_replans_that_changed_nothing() -> None:
     study = disturbed(noisy_false_triggers=3)
-    with_rates = with_false_triggers(study.trials, study.replans)
+    with_rates = with_false_triggers(study.measurements, study.replans)
     low = with_rates["noise"] == "low"
     expected = 3.0 / (with_rates["completion_time_s"] / 60.0)
     np.testing.assert_allclose(with_rates.loc[low, "false_triggers_per_min"], expected[low])

@@ -54,7 +54,7 @@ def test_intervals_cover_the_truth_when_scenes_differ() -> None:
     mean_hits = rate_hits = plain_hits = 0
     for _ in range(runs):
         values = rng.normal(0.0, 1.0, 10)[scene] + rng.normal(0.0, 1.5, scene.size)
-        samples = statistics.resampled_means(values[:, None], scene, resamples=600)
+        samples = statistics.resampled_means([values[:, None]], scene, resamples=600)
         low, high = statistics.percentile_interval(samples, 10)
         mean_hits += bool(low[0] <= 0.0 <= high[0])
         success = rng.random(scene.size) < rng.beta(4.0, 1.0, 10)[scene]
@@ -72,7 +72,7 @@ def test_resampling_has_the_spread_of_two_stages() -> None:
     rng = np.random.default_rng(1)
     values = rng.normal(0.0, 1.0, (10, 30)) + rng.normal(0.0, 0.5, (10, 1))
     samples = statistics.resampled_means(
-        values.reshape(-1, 1), np.repeat(np.arange(10), 30), resamples=20_000
+        [values.reshape(-1, 1)], np.repeat(np.arange(10), 30), resamples=20_000
     )
     expected = values.mean(axis=1).var() / 10 + values.var(axis=1).mean() / 300
     assert samples.var() == pytest.approx(expected, rel=0.05)
@@ -88,9 +88,9 @@ def test_one_scene_resamples_its_rows() -> None:
 
 def test_missing_values_leave_the_mean_not_the_pairing() -> None:
     values = np.array([[1.0, 10.0], [2.0, math.nan], [3.0, 30.0], [4.0, 40.0]])
-    samples = statistics.resampled_means(values, np.array([0, 0, 1, 1]), resamples=500)
+    samples = statistics.resampled_means([values], np.array([0, 0, 1, 1]), resamples=500)
     both = np.array([[1.0, 10.0], [3.0, 30.0], [4.0, 40.0]])
-    paired = statistics.resampled_means(both, np.array([0, 1, 1]), resamples=500)
+    paired = statistics.resampled_means([both], np.array([0, 1, 1]), resamples=500)
     assert np.allclose(10.0 * paired[:, 0], paired[:, 1])
     assert np.nanmin(samples[:, 1]) >= 10.0
     assert np.nanmax(samples[:, 1]) <= 40.0
@@ -104,9 +104,29 @@ def test_same_trials_same_interval() -> None:
 
 def test_many_rows_in_batches_give_means_around_the_mean() -> None:
     values = np.random.default_rng(3).normal(5.0, 1.0, (12_000, 1))
-    samples = statistics.resampled_means(values, np.repeat([0, 1], 6000))
+    samples = statistics.resampled_means([values], np.repeat([0, 1], 6000))
     assert len(samples) == statistics.RESAMPLES_OF_MANY
     assert samples.mean() == pytest.approx(values.mean(), abs=0.005)
+
+
+def test_very_many_rows_have_the_intervals_of_rows_drawn_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng, scene = np.random.default_rng(5), np.repeat(np.arange(8), 3000)
+    values = np.column_stack([rng.gamma(2.0, size=scene.size) + scene, rng.normal(3.0, 1.0, scene.size)])
+    values[rng.random(values.shape) < 0.1] = math.nan
+    columns = np.column_stack([values, 2.0 * values[:, 0], np.full(scene.size, 0.1)])
+    drawn = statistics.resampled_means([columns[:, :1], columns[:, 1:]], scene, resamples=4000)
+    monkeypatch.setattr(statistics, "_MANY_ROWS", 1000)
+    limit = statistics.resampled_means([columns], scene, resamples=4000)
+    for ours, theirs in zip(
+        statistics.percentile_interval(limit, 8), statistics.percentile_interval(drawn, 8), strict=True
+    ):
+        np.testing.assert_allclose(ours[0], theirs[0], atol=0.1 * np.nanstd(drawn[:, 0]) + 0.05)
+        np.testing.assert_allclose(ours[1], theirs[1], atol=0.002)
+        assert math.isnan(ours[3]), "equal values have no interval"
+        assert math.isnan(theirs[3])
+    np.testing.assert_allclose(limit[:, 2], 2.0 * limit[:, 0], rtol=1e-9)
+    within = statistics.resampled_means([columns[:, 1:2]], np.zeros(scene.size), resamples=4000)
+    assert within.std() == pytest.approx(np.nanstd(values[:, 1]) / math.sqrt(0.9 * scene.size), rel=0.05)
 
 
 def test_one_unit_has_no_bootstrap_interval() -> None:

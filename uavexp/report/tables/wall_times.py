@@ -16,7 +16,7 @@ _LABELS = {
 
 def table(results: Results, *, name: str) -> Table | None:
     """Medians over flights; none where no time was kept."""
-    trials = results.study.trials
+    trials = results.study.measurements
     have = [column for column in _LABELS if column in trials]
     if not have:
         return None
