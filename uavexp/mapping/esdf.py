@@ -22,7 +22,6 @@ Two such transforms, towards occupied and towards other voxels, make the signed 
 
 from __future__ import annotations
 
-import functools
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -33,6 +32,7 @@ from uavexp.arrays import Bool, Float32, Int32, UInt8
 from uavexp.errors import require
 from uavexp.mapping.esdf_changes import emit, flag_columns, list_changed, mark_seen
 from uavexp.mapping.esdf_kernels import Int16, carry_x, carry_y, carry_z
+from uavexp.memory import blank
 from uavexp.types import MapUpdate
 
 _LARGEST_CAP = 16_000  # sums of two capped squares must fit 16 bits
@@ -93,7 +93,7 @@ class SignedDistance:
         self._outside = self._stages(True, self.cap, shape)
         self._inside = self._stages(False, 0, shape)
         self._published = np.full(size, self.cap, np.int16)
-        self._seen = np.zeros(size, np.uint8)
+        self._seen = blank(size, np.uint8)
         self._flagged = np.zeros(nx * ny, np.uint8)
         self._marked = np.zeros(nx * ny, np.uint8)
         self._touched = np.tile(np.array([ny, 0], np.int32), (nx, 1))
@@ -102,8 +102,8 @@ class SignedDistance:
     @staticmethod
     def _stages(to_occupied: bool, start: int, shape: tuple[int, int, int]) -> _Stages:
         peak = np.full(shape[0] * shape[1], start, np.int16)
-        fill = np.zeros if start == 0 else functools.partial(np.full, fill_value=start)  # zeros cost nothing
-        along = [fill(peak.size * shape[2], dtype=np.int16) for _ in range(3)]
+        size = peak.size * shape[2]
+        along = [np.full(size, start, np.int16) if start else blank(size, np.int16) for _ in range(3)]
         return _Stages(to_occupied, peak, start, *along)
 
     @staticmethod

@@ -39,6 +39,7 @@ from uavexp.errors import WorldError
 from uavexp.field import FREE, OCCUPIED, UNKNOWN, DistanceField
 from uavexp.mapping.esdf import SignedDistance
 from uavexp.mapping.tiles import count_changes, no_changes
+from uavexp.memory import blank
 from uavexp.types import MapUpdate
 
 # bits of a live voxel's byte: 0-1 state, 2 on the list of changes, 3-7 evidence
@@ -201,10 +202,10 @@ class OccupancyMap:
         self.voxel_size_m = voxel_size_m
         self.voxels = Voxels(
             shape=self.shape,
-            tsdf_m=np.zeros(size, np.float32),
-            weight=np.zeros(size, np.uint8),
-            live=np.zeros(size, np.uint8),
-            state=np.zeros(size, np.uint8),
+            tsdf_m=blank(size, np.float32),
+            weight=blank(size, np.uint8),
+            live=blank(size, np.uint8),
+            state=blank(size, np.uint8),
             changes=np.empty(size, np.int32),
         )
         self.changed = 0  # how many of the voxels' `changes` are in use

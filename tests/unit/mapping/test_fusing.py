@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import resource
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -12,6 +15,7 @@ from uavexp.errors import ConfigError
 from uavexp.field import FREE, OCCUPIED, UNKNOWN
 from uavexp.mapping.base import MapBackend
 from uavexp.mapping.voxel_block_grid import VoxelBlockGrid
+from uavexp.memory import blank
 
 CAMERA_M = (0.55, 3.05, 1.45)
 WALL_M = 3.0  # x of the near face
@@ -267,3 +271,18 @@ def test_a_hall_of_100_m_is_mapped_with_the_default_memory(option):
     backend = FUSING[option]()
     backend.reset(np.array([[-0.2, -0.2, -0.2], [100.2, 100.2, 3.2]]), NOTHING)
     assert backend.field.state.size > 30_000_000
+
+
+def test_what_is_not_seen_of_a_large_hall_takes_no_memory():
+    """Of the 26 bytes a voxel only those that are not zero to begin with."""
+    voxels = 40_000_000
+    array = blank(voxels, np.float32)
+    before_mib = resident_mib()
+    array[: voxels // 100] = 1.0
+    array[voxels // 2] = 1.0  # numpy's zeros would take 2 MB
+    assert (array[voxels // 2 + 1 :: 100_000] == 0.0).all()
+    assert 1.4 < resident_mib() - before_mib < 3.0
+
+
+def resident_mib() -> float:
+    return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize() / 2**20

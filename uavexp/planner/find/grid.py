@@ -27,6 +27,7 @@ import numpy as np
 
 from uavexp.arrays import Float, Float32, Int, UInt8
 from uavexp.field import DistanceField
+from uavexp.memory import blank
 from uavexp.parameters import Count, NonNegative, option
 from uavexp.planner.constraints import Constraints
 from uavexp.planner.find.base import FoundPath
@@ -62,13 +63,13 @@ class _Memory:
         if len(self.clearance) < columns:
             self.columns, self.clearance = _nodes(columns), np.empty(columns, dtype=np.float32)
         if len(self.parent) < cells:
-            self.cells, self.parent = _nodes(cells), np.empty(cells, dtype=np.uint8)
+            self.cells, self.parent = _nodes(cells), blank(cells, np.uint8)
         self.generation += 1
 
 
 def _nodes(size: int) -> Nodes:
-    stamp, place = np.zeros(size, dtype=np.int32), np.empty(size, dtype=np.int32)
-    return Nodes(np.empty(size), np.empty(size), stamp, place, np.empty(size, dtype=np.int32))
+    cost, key = (blank(size, np.float64) for _ in range(2))
+    return Nodes(cost, key, *(blank(size, np.int32) for _ in range(3)))
 
 
 @option
