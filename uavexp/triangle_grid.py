@@ -151,16 +151,17 @@ def box_meets_mesh(grid: TriangleGrid, centre: Float, rotation: Float, half: Flo
             + abs(rotation[axis, 2]) * half[2]
         )
         low[axis], high[axis] = centre[axis] - reach, centre[axis] + reach
-    if _is_outside(grid, low, high):
-        return False
-    for i in _cells(grid, low, high, 0):
-        for j in _cells(grid, low, high, 1):
-            for k in _cells(grid, low, high, 2):
-                flat = (i * grid.shape[1] + j) * grid.shape[2] + k
-                for item in range(grid.starts[flat], grid.starts[flat + 1]):
-                    corner = grid.corners_m[grid.items[item]]
-                    if _is_near(corner, low, high) and box_meets_triangle(corner, centre, rotation, half):
-                        return True
+    starts, items, corners = grid.starts, grid.items, grid.corners_m
+    (first_i, end_i), (first_j, end_j) = _span(grid, low, high, 0), _span(grid, low, high, 1)
+    first_k, end_k = _span(grid, low, high, 2)
+    wide, deep = grid.shape[1], grid.shape[2]
+    for i in range(first_i, end_i):
+        for j in range(first_j, end_j):
+            row = (i * wide + j) * deep
+            for item in range(starts[row + first_k], starts[row + end_k]):
+                corner = corners[items[item]]
+                if _is_near(corner, low, high) and box_meets_triangle(corner, centre, rotation, half):
+                    return True
     return False
 
 
@@ -169,40 +170,27 @@ def ball_meets_mesh(grid: TriangleGrid, centre: Float, radius: float) -> bool:
     """Whether some triangle comes nearer to the centre (3,) than `radius`."""
     low = centre - radius
     high = centre + radius
-    if _is_outside(grid, low, high):
-        return False
-    for i in _cells(grid, low, high, 0):
-        for j in _cells(grid, low, high, 1):
-            for k in _cells(grid, low, high, 2):
-                flat = (i * grid.shape[1] + j) * grid.shape[2] + k
-                for item in range(grid.starts[flat], grid.starts[flat + 1]):
-                    corner = grid.corners_m[grid.items[item]]
-                    if (
-                        _is_near(corner, low, high)
-                        and squared_distance_to_triangle(corner, centre) < radius * radius
-                    ):
-                        return True
+    starts, items, corners = grid.starts, grid.items, grid.corners_m
+    (first_i, end_i), (first_j, end_j) = _span(grid, low, high, 0), _span(grid, low, high, 1)
+    first_k, end_k = _span(grid, low, high, 2)
+    wide, deep = grid.shape[1], grid.shape[2]
+    for i in range(first_i, end_i):
+        for j in range(first_j, end_j):
+            row = (i * wide + j) * deep
+            for item in range(starts[row + first_k], starts[row + end_k]):
+                corner = corners[items[item]]
+                if _is_near(corner, low, high) and squared_distance_to_triangle(corner, centre) < radius**2:
+                    return True
     return False
 
 
 @nb.njit(cache=True)
-def _cells(grid: TriangleGrid, low: Float, high: Float, axis: int) -> range:
-    """The cells that an interval covers along one axis."""
-    first = _cell_of(low[axis], grid.origin_m[axis], grid.cell_m, grid.shape[axis])
-    last = _cell_of(high[axis], grid.origin_m[axis], grid.cell_m, grid.shape[axis])
-    return range(first, last + 1)
-
-
-@nb.njit(cache=True, inline="always")
-def _is_outside(grid: TriangleGrid, low: Float, high: Float) -> bool:
-    """Whether the box from `low` to `high`, each (3,), lies apart from the whole grid."""
-    for axis in range(3):
-        if (
-            high[axis] < grid.origin_m[axis]
-            or low[axis] > grid.origin_m[axis] + grid.shape[axis] * grid.cell_m
-        ):
-            return True
-    return False
+def _span(grid: TriangleGrid, low: Float, high: Float, axis: int) -> tuple[int, int]:
+    """First cell that an interval covers along one axis, and the one after the last; outside: none."""
+    origin, cell, count = grid.origin_m[axis], grid.cell_m, grid.shape[axis]
+    if high[axis] < origin or low[axis] > origin + count * cell:
+        return 0, 0
+    return _cell_of(low[axis], origin, cell, count), _cell_of(high[axis], origin, cell, count) + 1
 
 
 @nb.njit(cache=True)
