@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -58,18 +57,29 @@ class Stopwatch:
 
     laps_s: dict[str, list[float]] = field(default_factory=dict)
 
-    @contextmanager
-    def lap(self, name: str) -> Iterator[None]:
-        """Time the block under this name."""
-        begin = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.add(name, time.perf_counter() - begin)
+    def lap(self, name: str) -> Lap:
+        """Time a `with` block under this name."""
+        return Lap(self, name)
 
     def add(self, name: str, lap_s: float) -> None:
         """Add a lap that was timed elsewhere."""
         self.laps_s.setdefault(name, []).append(lap_s)
+
+
+class Lap:
+    """A block that is being timed; many are, so nothing but that is done."""
+
+    __slots__ = ("_begin_s", "_name", "_watch")
+
+    def __init__(self, watch: Stopwatch, name: str) -> None:
+        self._watch = watch
+        self._name = name
+
+    def __enter__(self) -> None:
+        self._begin_s = time.perf_counter()
+
+    def __exit__(self, *_: object) -> None:
+        self._watch.add(self._name, time.perf_counter() - self._begin_s)
 
 
 class Recorder:
