@@ -25,6 +25,31 @@ def _cell(shape: int, coordinate: float) -> tuple[int, float]:
     return lower, coordinate - lower
 
 
+@nb.njit(cache=True, inline="always")
+def value_at(distance: Float32, origin_m: Float, voxel_size_m: float, x: float, y: float, z: float) -> float:
+    """Trilinear value at one point, clamped to the edge outside the grid."""
+    nx, ny, nz = distance.shape
+    i, fx = _cell(nx, (x - origin_m[0]) / voxel_size_m - 0.5)
+    j, fy = _cell(ny, (y - origin_m[1]) / voxel_size_m - 0.5)
+    k, fz = _cell(nz, (z - origin_m[2]) / voxel_size_m - 0.5)
+    i1, j1, k1 = min(i + 1, nx - 1), min(j + 1, ny - 1), min(k + 1, nz - 1)
+    d000, d001 = distance[i, j, k], distance[i, j, k1]
+    d010, d011 = distance[i, j1, k], distance[i, j1, k1]
+    d00, d01 = d000 + (distance[i1, j, k] - d000) * fx, d001 + (distance[i1, j, k1] - d001) * fx
+    d10, d11 = d010 + (distance[i1, j1, k] - d010) * fx, d011 + (distance[i1, j1, k1] - d011) * fx
+    d0, d1 = d00 + (d10 - d00) * fy, d01 + (d11 - d01) * fy
+    return float(d0 + (d1 - d0) * fz)
+
+
+@nb.njit(cache=True)
+def interpolate(distance: Float32, origin_m: Float, voxel_size_m: float, points_m: Float) -> Float:
+    """Trilinear value at points (N, 3) -> (N,)."""
+    value = np.empty(points_m.shape[0])
+    for n in range(points_m.shape[0]):
+        value[n] = value_at(distance, origin_m, voxel_size_m, points_m[n, 0], points_m[n, 1], points_m[n, 2])
+    return value
+
+
 @nb.njit(cache=True)
 def value_and_gradient(
     distance: Float32, origin_m: Float, voxel_size_m: float, points_m: Float
@@ -63,12 +88,6 @@ def value_and_gradient(
         gradient[n, 1] = ((d10 - d00) + ((d11 - d01) - (d10 - d00)) * fz) / voxel_size_m if inside_y else 0.0
         gradient[n, 2] = (d1 - d0) / voxel_size_m if inside_z else 0.0
     return value, gradient
-
-
-def interpolate(distance: Float32, origin_m: Float, voxel_size_m: float, points_m: Float) -> Float:
-    """Trilinear value at points (N, 3) -> (N,)."""
-    value: Float = value_and_gradient(distance, origin_m, voxel_size_m, points_m)[0]
-    return value
 
 
 def gradient_at(distance: Float32, origin_m: Float, voxel_size_m: float, points_m: Float) -> Float:
@@ -117,7 +136,8 @@ class DistanceField:
 
     def distance_m(self, points_m: Float) -> Float:
         """Trilinear signed distance at points (N, 3) -> (N,); clamped to the grid's edge."""
-        return interpolate(self.distance, self.origin_m, self.voxel_size_m, points_m)
+        value: Float = interpolate(self.distance, self.origin_m, self.voxel_size_m, points_m)
+        return value
 
     def gradient(self, points_m: Float) -> Float:
         """Exact gradient of the trilinear field at points (N, 3) -> (N, 3), unitless."""

@@ -41,8 +41,8 @@ class Constraints:
             return f"clearance {clearance[worst]:.2f} m at {_text(points_m[worst])}"
         # a start outside the bounds may come back, not go further
         low, high = np.minimum(bounds[0], points_m[0]) - 1e-6, np.maximum(bounds[1], points_m[0]) + 1e-6
-        outside = ((points_m < low) | (points_m > high)).any(axis=1)
-        if outside.any():
+        if (points_m.min(axis=0) < low).any() or (points_m.max(axis=0) > high).any():
+            outside = ((points_m < low) | (points_m > high)).any(axis=1)
             return f"leaves the flight bounds at {_text(points_m[int(np.argmax(outside))])}"
         if self.known_only:
             known = field.observed(points_m)

@@ -25,22 +25,23 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from uavexp.arrays import Float, Float32, Int, UInt8
-from uavexp.field import DistanceField
+from uavexp.arrays import Float, Int, UInt8
 from uavexp.memory import blank
 from uavexp.parameters import Count, NonNegative, option
 from uavexp.planner.constraints import Constraints
 from uavexp.planner.find.base import FoundPath
+from uavexp.planner.find.column_path import CLIMB, over_columns
 from uavexp.planner.find.ends import refusal
 from uavexp.planner.find.grid_search import (
     BUDGET,
     FOUND,
-    STEPS,
     ClearanceRule,
     Nodes,
     Space,
     plan_cells,
     plan_columns,
+    searched,
+    trace,
 )
 from uavexp.types import PlanRequest, PlanStatus
 
@@ -53,18 +54,24 @@ class _Memory:
 
     generation: int = 0
     columns: Nodes = field(default_factory=lambda: _nodes(0))
-    clearance: Float32 = field(default_factory=lambda: np.empty(0, dtype=np.float32))
+    worth: Float = field(default_factory=lambda: np.empty(0))
+    beyond: UInt8 = field(default_factory=lambda: np.empty(0, dtype=np.uint8))  # each column's next one
     cells: Nodes = field(default_factory=lambda: _nodes(0))
     parent: UInt8 = field(default_factory=lambda: np.empty(0, dtype=np.uint8))
 
     def fit(self, shape: Int) -> None:
-        """Make room for a box of this shape (3,), and begin a new search."""
+        """Make room for a box of this shape (3,)."""
         columns, cells = int(shape[0] * shape[1]), int(shape.prod())
-        if len(self.clearance) < columns:
-            self.columns, self.clearance = _nodes(columns), np.empty(columns, dtype=np.float32)
+        if len(self.worth) < columns:
+            self.columns, self.worth = _nodes(columns), np.empty(columns)
+            self.beyond = np.empty(columns, dtype=np.uint8)
         if len(self.parent) < cells:
             self.cells, self.parent = _nodes(cells), blank(cells, np.uint8)
+
+    def next(self) -> int:
+        """Begin a search."""
         self.generation += 1
+        return self.generation
 
 
 def _nodes(size: int) -> Nodes:
@@ -78,6 +85,8 @@ class Grid:
 
     clearance_weight: NonNegative = 2.0  # 1, share by which a path of the least clearance counts as longer
     # [ours]
+    slack: NonNegative = 0.05  # 1, share by which the path may cost more than the least: so much may be
+    # lost by searching columns alone [ours]
     max_expansions: Count = 300_000  # cells that the search may expand
     _memory: _Memory = field(default_factory=_Memory, init=False, repr=False, compare=False)
 
@@ -87,31 +96,40 @@ class Grid:
         refused = refusal(request, constraints)
         if refused is not None:
             return refused
-        space = self._space(request, constraints)
-        memory = self._memory
+        space, memory = self._space(request, constraints), self._memory
         memory.fit(space.box[1] - space.box[0] + 1)
-        status, total, planar = plan_columns(space, memory.generation, memory.columns, memory.clearance)
+        columns = (memory.columns, memory.worth, memory.beyond)
+        inflation = 1.0 + self.slack if space.cut_corners else 1.0
+        status, planar_cost, expansions = plan_columns(space, memory.next(), inflation, *columns)
         if status != FOUND:
-            return _no_path("start and goal are not joined at the clearance limit", planar)
-        budget = (memory.generation, self.max_expansions)
-        status, cost, expansions = plan_cells(
-            space, *budget, total, memory.columns, memory.cells, memory.parent
-        )
-        expansions += planar
-        if status == BUDGET:
-            return _no_path(f"not found in {self.max_expansions} expansions", expansions)
-        if status != FOUND:
-            return _no_path("start and goal are not joined in the height band", expansions)
+            return _no_path("start and goal are not joined at the clearance limit", expansions)
+        cost, cells = np.inf, space.start[None]
+        if space.cut_corners:
+            cost, cells = over_columns(space, memory.beyond, expansions + 1)
+        if cost > inflation * (planar_cost + CLIMB * abs(int(space.goal[2] - space.start[2]))):
+            if inflation > 1.0:
+                _, planar_cost, more = plan_columns(space, memory.next(), 1.0, *columns)
+                expansions += more
+            budget = (memory.generation, self.max_expansions)
+            status, cost, more = plan_cells(
+                space, *budget, planar_cost, memory.columns, memory.cells, memory.parent
+            )
+            expansions += more
+            if status == BUDGET:
+                return _no_path(f"not found in {self.max_expansions} expansions", expansions)
+            if status != FOUND:
+                return _no_path("start and goal are not joined in the height band", expansions)
+            cells = trace(space, memory.parent, more + 1)
         voxel_m = request.field.voxel_size_m
-        path_m = request.field.origin_m + (_trace(space, memory.parent) + 0.5) * voxel_m
+        path_m = request.field.origin_m + (cells + 0.5) * voxel_m
         path_m = np.concatenate([request.position_m[None], path_m[1:-1], request.goal.position_m[None]])
         return FoundPath(status=PlanStatus.OK, path_m=path_m, cost=cost * voxel_m, expansions=expansions)
 
     def _space(self, request: PlanRequest, constraints: Constraints) -> Space:
         """The voxels of the flight bounds within the height band, and what they are worth."""
         map_, start_m, goal_m = request.field, request.position_m, request.goal.position_m
-        box = _box(request, constraints.z_band_m)
-        start, goal = (np.clip(_voxel(map_, end_m), box[0], box[1]) for end_m in (start_m, goal_m))
+        grid = (map_.origin_m, map_.voxel_size_m, np.array(map_.distance.shape))
+        box, start, goal = searched(*grid, start_m, goal_m, request.flight_bounds_m, constraints.z_band_m)
         here_m = min(float(map_.distance_m(start_m[None])[0]), float(map_.distance[tuple(start)]))
         least_m = constraints.min_clearance_m + _RESERVE_VOXELS * map_.voxel_size_m
         spread, missing = constraints.safe_clearance_m - least_m, max(least_m - here_m, 0.0)
@@ -125,35 +143,6 @@ class Grid:
         )
         cut_corners = bool(constraints.min_clearance_m >= 0.5 * np.sqrt(3.0) * map_.voxel_size_m)
         return Space(map_.distance, map_.state, constraints.known_only, cut_corners, rule, box, start, goal)
-
-
-def _box(request: PlanRequest, z_band_m: float) -> Int:
-    """First and last voxel (2, 3) of the flight bounds within the height band."""
-    map_, start_m, goal_m = request.field, request.position_m, request.goal.position_m
-    low, high = request.flight_bounds_m.copy()
-    low[2] = max(low[2], min(start_m[2], goal_m[2]) - z_band_m)
-    high[2] = min(high[2], max(start_m[2], goal_m[2]) + z_band_m)
-    first = np.ceil((low - map_.origin_m) / map_.voxel_size_m - 0.5 - 1e-9)
-    final = np.floor((high - map_.origin_m) / map_.voxel_size_m - 0.5 + 1e-9)
-    goal = _voxel(map_, goal_m)  # a bound narrower than a voxel still holds the goal's
-    box = np.stack([np.minimum(first, goal), np.maximum(final, goal)]).astype(np.int64)
-    return np.clip(box, 0, np.array(map_.distance.shape) - 1)
-
-
-def _trace(space: Space, parent: UInt8) -> Int:
-    """Voxels (P, 3) from start to goal, by the parents that the search left."""
-    shape = space.box[1] - space.box[0] + 1
-    start, cell = space.start - space.box[0], space.goal - space.box[0]
-    steps = [cell]
-    while not np.array_equal(cell, start):
-        cell = cell - STEPS[parent[(cell[0] * shape[1] + cell[1]) * shape[2] + cell[2]]]
-        steps.append(cell)
-    return np.asarray(np.array(steps[::-1]) + space.box[0])
-
-
-def _voxel(map_: DistanceField, point_m: Float) -> Int:
-    index = np.floor((point_m - map_.origin_m) / map_.voxel_size_m).astype(np.int64)
-    return np.clip(index, 0, np.array(map_.distance.shape) - 1)
 
 
 def _no_path(reason: str, expansions: int) -> FoundPath:

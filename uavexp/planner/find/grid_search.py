@@ -56,6 +56,42 @@ class Space(NamedTuple):
     goal: Int  # (3,) voxel
 
 
+@nb.njit(cache=True)
+def searched(
+    origin_m: Float,
+    voxel_m: float,
+    shape: Int,
+    start_m: Float,
+    goal_m: Float,
+    bounds_m: Float,
+    z_band_m: float,
+) -> tuple[Int, Int, Int]:
+    """First and last voxel (2, 3) of the flight bounds within the height band, and those of start and goal.
+
+    Args:
+        origin_m: (3,) of the map.
+        voxel_m: its voxels' edge.
+        shape: (3,) of it, voxels.
+        start_m: (3,).
+        goal_m: (3,); a bound narrower than a voxel still holds its voxel.
+        bounds_m: (2, 3) of the flight.
+        z_band_m: what the heights between start and goal may be left by.
+    """
+    box, start, goal = np.empty((2, 3), np.int64), np.empty(3, np.int64), np.empty(3, np.int64)
+    for axis in range(3):
+        low, high, last = bounds_m[0, axis], bounds_m[1, axis], shape[axis] - 1
+        if axis == 2:
+            low = max(low, min(start_m[axis], goal_m[axis]) - z_band_m)
+            high = min(high, max(start_m[axis], goal_m[axis]) + z_band_m)
+        first = np.ceil((low - origin_m[axis]) / voxel_m - 0.5 - 1e-9)
+        final = np.floor((high - origin_m[axis]) / voxel_m - 0.5 + 1e-9)
+        at = min(max(np.floor((goal_m[axis] - origin_m[axis]) / voxel_m), 0), last)
+        box[0, axis], box[1, axis] = max(min(first, at), 0), min(max(final, at), last)
+        here = np.floor((start_m[axis] - origin_m[axis]) / voxel_m)
+        start[axis], goal[axis] = min(max(here, box[0, axis]), box[1, axis]), at
+    return box, start, goal
+
+
 class Nodes(NamedTuple):
     """Memory of a search: a row for each cell or column."""
 
@@ -67,7 +103,7 @@ class Nodes(NamedTuple):
 
 
 @nb.njit(cache=True, inline="always")
-def _penalty(clearance: float, rule: ClearanceRule) -> float:
+def penalty(clearance: float, rule: ClearanceRule) -> float:
     """Share by which a cell of this clearance lengthens the way through it."""
     if clearance >= rule.safe_m:
         return 0.0
@@ -77,13 +113,13 @@ def _penalty(clearance: float, rule: ClearanceRule) -> float:
 
 
 @nb.njit(cache=True, inline="always")
-def _limit(rule: ClearanceRule, distance_voxels_squared: float) -> float:
+def limit(rule: ClearanceRule, distance_voxels_squared: float) -> float:
     """Least clearance of a passable cell at this squared distance from the start."""
     return float(min(rule.least_m, rule.start_m) if distance_voxels_squared <= rule.reach2 else rule.least_m)
 
 
 @nb.njit(cache=True)
-def _clearance(space: Space, i: int, j: int, k: int) -> float:
+def cell_clearance(space: Space, i: int, j: int, k: int) -> float:
     """Clearance of a cell; where unknown is closed: none in it, and the least allowed next to it."""
     state = space.state
     here = float(space.distance[i, j, k])
@@ -106,7 +142,7 @@ def _best_clearance(space: Space, i: int, j: int) -> float:
     """Clearance of a column's best cell."""
     best = -np.inf
     for k in range(space.box[0, 2], space.box[1, 2] + 1):
-        best = max(best, _clearance(space, i, j, k))
+        best = max(best, cell_clearance(space, i, j, k))
     return best
 
 
@@ -142,15 +178,26 @@ def _improve(nodes: Nodes, size: int, node: int, cost: float, key: float) -> int
 
 
 @nb.njit(cache=True)
-def plan_columns(space: Space, generation: int, columns: Nodes, clearance: Float32) -> tuple[int, float, int]:
-    """Backward planar A* over columns; returns status, cost in voxels and expansions."""
+def plan_columns(
+    space: Space, generation: int, inflation: float, columns: Nodes, worth: Float, parent: UInt8
+) -> tuple[int, float, int]:
+    """Backward planar A* over columns; returns status, cost in voxels and expansions.
+
+    Args:
+        space: what is searched.
+        generation: of this search.
+        inflation: of the heuristic: the cost is at most so many times the least.
+        columns: memory.
+        worth: (columns,) where the penalty of each column's best cell is written.
+        parent: (columns,) where the column that one was reached from is written, 3 (di + 1) + dj + 1 away.
+    """
     box, start, goal, rule = space.box, space.start, space.goal, space.rule
     i0, j0, i1, j1 = box[0, 0], box[0, 1], box[1, 0], box[1, 1]
     nj = j1 - j0 + 1
     source = (goal[0] - i0) * nj + goal[1] - j0
     target = (start[0] - i0) * nj + start[1] - j0
     _begin(columns, source, _octile(goal[0] - start[0], goal[1] - start[1], 0), generation)
-    clearance[source] = _best_clearance(space, goal[0], goal[1])
+    worth[source] = penalty(_best_clearance(space, goal[0], goal[1]), rule)
     size, expansions = 1, 0
     while size > 0:
         cell = pop(columns.heap, columns.place, columns.key, size)
@@ -159,7 +206,6 @@ def plan_columns(space: Space, generation: int, columns: Nodes, clearance: Float
         if cell == target:
             return FOUND, columns.cost[cell], expansions
         ci, cj = cell // nj + i0, cell % nj + j0
-        here = _penalty(clearance[cell], rule)
         for i in range(max(ci - 1, i0), min(ci + 1, i1) + 1):
             for j in range(max(cj - 1, j0), min(cj + 1, j1) + 1):
                 if i == ci and j == cj:
@@ -167,16 +213,17 @@ def plan_columns(space: Space, generation: int, columns: Nodes, clearance: Float
                 other = (i - i0) * nj + j - j0
                 if columns.stamp[other] != generation:
                     best = _best_clearance(space, i, j)
-                    clearance[other] = best
-                    least = _limit(rule, float((i - start[0]) ** 2 + (j - start[1]) ** 2))
+                    worth[other] = penalty(best, rule)
+                    least = limit(rule, float((i - start[0]) ** 2 + (j - start[1]) ** 2))
                     _see(columns, other, generation, best < least and other != target)
                 if columns.place[other] == _CLOSED or columns.place[other] == _BLOCKED:
                     continue
                 step = 1.4142135623730951 if i != ci and j != cj else 1.0
-                there = columns.cost[cell] + step * (1.0 + 0.5 * (here + _penalty(clearance[other], rule)))
+                there = columns.cost[cell] + step * (1.0 + 0.5 * (worth[cell] + worth[other]))
                 if there < columns.cost[other]:
-                    key = there + _octile(i - start[0], j - start[1], 0)
+                    key = there + inflation * _octile(i - start[0], j - start[1], 0)
                     size = _improve(columns, size, other, there, key)
+                    parent[other] = 3 * (ci - i + 1) + cj - j + 1
     return NO_PATH, np.inf, expansions
 
 
@@ -217,21 +264,21 @@ def plan_cells(
             return BUDGET, np.inf, expansions
         expansions += 1
         ci, cj, ck = cell // (nk * nj) + i0, (cell // nk) % nj + j0, cell % nk + k0
-        here = _penalty(_clearance(space, ci, cj, ck), rule)
+        here = penalty(cell_clearance(space, ci, cj, ck), rule)
         for n in range(26):
             i, j, k = ci + STEPS[n, 0], cj + STEPS[n, 1], ck + STEPS[n, 2]
             if i < i0 or i > i1 or j < j0 or j > j1 or k < k0 or k > k1:
                 continue
             other = ((i - i0) * nj + j - j0) * nk + k - k0
-            clearance = _clearance(space, i, j, k)
+            clearance = cell_clearance(space, i, j, k)
             if cells.stamp[other] != generation:
                 apart = float((i - start[0]) ** 2 + (j - start[1]) ** 2 + (k - start[2]) ** 2)
-                _see(cells, other, generation, clearance < _limit(rule, apart) and other != target)
+                _see(cells, other, generation, clearance < limit(rule, apart) and other != target)
             if cells.place[other] == _CLOSED or cells.place[other] == _BLOCKED:
                 continue
             if not space.cut_corners and _cuts_corner(space, ci, cj, ck, n):
                 continue
-            there = cells.cost[cell] + _LENGTHS[n] * (1.0 + 0.5 * (here + _penalty(clearance, rule)))
+            there = cells.cost[cell] + _LENGTHS[n] * (1.0 + 0.5 * (here + penalty(clearance, rule)))
             if there < cells.cost[other]:
                 column = (i - i0) * nj + j - j0
                 bound = _planar_bound(columns, column, generation, planar_total, i - start[0], j - start[1])
@@ -239,6 +286,21 @@ def plan_cells(
                 size = _improve(cells, size, other, there, there + _TIE * bound)
                 parent[other] = n
     return NO_PATH, np.inf, expansions
+
+
+@nb.njit(cache=True)
+def trace(space: Space, parent: UInt8, longest: int) -> Int:
+    """Voxels (P, 3) from start to goal, at most `longest`, by the parents that `plan_cells` left."""
+    nj, nk = space.box[1, 1] - space.box[0, 1] + 1, space.box[1, 2] - space.box[0, 2] + 1
+    cells = np.empty((longest, 3), dtype=np.int64)
+    cell, n = space.goal - space.box[0], longest - 1
+    cells[n] = cell
+    while (cell != space.start - space.box[0]).any():
+        cell = cell - STEPS[parent[(cell[0] * nj + cell[1]) * nk + cell[2]]]
+        n -= 1
+        cells[n] = cell
+    path: Int = cells[n:] + space.box[0]
+    return path
 
 
 @nb.njit(cache=True, inline="always")
@@ -258,6 +320,6 @@ def _cuts_corner(space: Space, i: int, j: int, k: int, n: int) -> bool:
         for b in range(2):
             for c in range(2):
                 at_i, at_j, at_k = i + a * STEPS[n, 0], j + b * STEPS[n, 1], k + c * STEPS[n, 2]
-                if _clearance(space, at_i, at_j, at_k) < space.rule.least_m:
+                if cell_clearance(space, at_i, at_j, at_k) < space.rule.least_m:
                     return True
     return False

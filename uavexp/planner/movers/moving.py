@@ -149,7 +149,7 @@ class MovingObstacles:
             body_radius_m=self.body_radius_m, margin_m=self.margin_m, horizon_s=self.horizon_s
         )
         turn_s = np.full(len(self.tracks), np.inf)
-        if self.field is not None:
+        if self.field is not None and len(self):
             turn_s = turns_s(self.tracks, self.field, self.horizon_s)
         object.__setattr__(self, "_turn_s", turn_s)  # asked for by every table
 
@@ -160,6 +160,8 @@ class MovingObstacles:
         """Rows (B, COLUMNS) for kernels, with times counted from this absolute time."""
         tracks, ahead_s = self.tracks, from_s - self.tracks.time_s
         rows = np.empty((len(tracks), COLUMNS))
+        if not len(tracks):
+            return rows
         rows[:, 0:3] = tracks.position_m + np.minimum(ahead_s, self._turn_s)[:, None] * tracks.velocity_mps
         rows[:, 3:6], rows[:, 6:9] = tracks.velocity_mps, tracks.half_size_m
         diagonal = np.einsum("nii->ni", tracks.covariance)

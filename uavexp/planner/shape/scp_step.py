@@ -1,6 +1,6 @@
 """One step of the sequential convex programme of `min_acc`: local model, QP data, merit.
 
-Merit: ∫ ‖r''‖² + λ c(r) dt + μ Σ ‖r - p‖² over the samples that are tethered to path points p.
+Merit: ∫ ‖r''‖² + τ² ‖r'''‖² + λ c(r) dt + μ Σ ‖r - p‖² over the samples that are tethered to path points p.
 The obstacle cost is c(d) = (1 - d/safe)₊² + 10 ((hard - d)/safe)₊², d the mapped distance, or what
 is left of the distance to a mover at the sample's instant (`moving`) if that is less.
 It has a kink on the medial axis of a gap, where Gauss-Newton would jump from wall to wall;
@@ -16,13 +16,16 @@ import numba as nb
 import numpy as np
 
 from uavexp.arrays import Float, Float32
-from uavexp.field import value_and_gradient
+from uavexp.field import value_at
 from uavexp.planner.movers.moving import clearance_after
+from uavexp.planner.shape.band_qp import Rows, solve_band_qp
 from uavexp.planner.spline.uniform import SAMPLES
 
 HARD_WEIGHT = 10.0
 NEAR_LIMIT, NEAR_BOUND_M = 0.6, 0.5  # what is farther from its limit gets no row
 EXCESS_WEIGHT = 1000.0  # of relative excess over a limit in the merit: an exact penalty
+_STENCILS = np.array([[-1.0, 1.0, 0.0], [1.0, -2.0, 1.0]])
+_BAND = 11  # of the Hessian: control points three apart share a span
 _HARD_STARTS = 4  # first accelerations, where a moving start leaves the least freedom
 # half spaces around a vector, in (along, level across, up from both): towards it and 24° from it,
 # then to the other sides as well
@@ -46,7 +49,7 @@ class Merit(NamedTuple):
     """What a curve is judged by, all but its control points."""
 
     h: float  # knot spacing, s
-    energy: Float  # (N, N) of the spline (`Uniform.effort`)
+    energy: Float  # (N, N) of the spline: ∫ ‖r''‖² + τ² ‖r'''‖² = Σ cᵀ energy c / h³
     position: Float  # (S, N) its samples
     distance: Float32  # the map
     origin_m: Float
@@ -83,29 +86,26 @@ def merit(control: Float, by: Merit) -> float:
         total += EXCESS_WEIGHT * max(np.sqrt(fast) / (h * by.limits[0]) - 1.0, 0.0)
         total += EXCESS_WEIGHT * max(np.sqrt(strong) / (h * h * by.limits[1]) - 1.0, 0.0)
     points = _samples(control, by.position)
-    d = _felt_m(points, 1, by)
     share = h / SAMPLES
     for k in range(points.shape[0]):
-        total += by.obstacle_weight * share * clearance_cost(d[k], by.safe_m, by.hard_m)
+        felt_m = _felt_m(points[k, 0], points[k, 1], points[k, 2], k, by)
+        total += by.obstacle_weight * share * clearance_cost(felt_m, by.safe_m, by.hard_m)
         if by.tether_weight[k] > 0.0:
             total += by.tether_weight[k] * share * ((points[k] - by.tether_m[k]) ** 2).sum()
     return float(total)
 
 
-@nb.njit(cache=True)
-def _felt_m(points: Float, each: int, by: Merit) -> Float:
-    """Distances of points, `each` of a sample, to what is mapped, lowered near movers at its instant.
+@nb.njit(cache=True, inline="always")
+def _felt_m(x: float, y: float, z: float, k: int, by: Merit) -> float:
+    """Distance of sample k's point to what is mapped, lowered near movers at its instant.
 
     To be just clear of a mover is worth as much as to have the least distance from what is fixed.
     """
-    distance_m: Float = value_and_gradient(by.distance, by.origin_m, by.voxel_m, points)[0]
-    if by.movers.shape[0] == 0:
-        return distance_m
-    for n in range(points.shape[0]):
-        ahead_s = (n // each + 0.5) * by.h / SAMPLES
-        clearance = clearance_after(by.movers, points[n, 0], points[n, 1], points[n, 2], ahead_s)
-        distance_m[n] = min(distance_m[n], clearance + by.least_m)
-    return distance_m
+    felt = value_at(by.distance, by.origin_m, by.voxel_m, x, y, z)
+    if by.movers.shape[0] > 0:
+        clearance = clearance_after(by.movers, x, y, z, (k + 0.5) * by.h / SAMPLES)
+        felt = min(felt, clearance + by.least_m)
+    return float(felt)
 
 
 @nb.njit(cache=True)
@@ -144,24 +144,18 @@ def _frame(vector: Float) -> Float:
 
 
 @nb.njit(cache=True)
-def _frames(control: Float) -> Float:
-    """Frame (3, 3) of the direction of motion at each of the SAMPLES * M samples."""
-    segments = control.shape[0] - 3
-    chord = control[control.shape[0] - 1] - control[0]
-    frames = np.empty((SAMPLES * segments, 3, 3))
-    tangent = np.empty(3)
-    for k in range(SAMPLES * segments):
-        m = k // SAMPLES
-        u = (k % SAMPLES + 0.5) / SAMPLES
-        for axis in range(3):
-            d0 = control[m + 1, axis] - control[m, axis]
-            d1 = control[m + 2, axis] - control[m + 1, axis]
-            d2 = control[m + 3, axis] - control[m + 2, axis]
-            tangent[axis] = 0.5 * (1 - u) * (1 - u) * d0 + (0.5 + u - u * u) * d1 + 0.5 * u * u * d2
-        if (tangent * tangent).sum() < 1e-8:
-            tangent[:] = chord
-        frames[k] = _frame(tangent)
-    return frames
+def _frame_at(control: Float, k: int) -> Float:
+    """Frame (3, 3) of the direction of motion at sample k."""
+    m, u = k // SAMPLES, (k % SAMPLES + 0.5) / SAMPLES
+    tangent, square = np.empty(3), 0.0
+    for axis in range(3):
+        d0 = control[m + 1, axis] - control[m, axis]
+        d1 = control[m + 2, axis] - control[m + 1, axis]
+        d2 = control[m + 3, axis] - control[m + 2, axis]
+        tangent[axis] = 0.5 * (1 - u) * (1 - u) * d0 + (0.5 + u - u * u) * d1 + 0.5 * u * u * d2
+        square += tangent[axis] ** 2
+    frame: Float = _frame(control[control.shape[0] - 1] - control[0] if square < 1e-8 else tangent)
+    return frame
 
 
 @nb.njit(cache=True)
@@ -171,14 +165,23 @@ def quadratic_model(control: Float, by: Merit) -> tuple[Float, Float]:
     Variable 3 j + axis moves control point 3 + j.
     """
     hessian, gradient = _energy_model(control, by)
-    points, frames = _samples(control, by.position), _frames(control)
-    d = _felt_m(around(points, frames, by.voxel_m), 7, by)
-    slope, bend = np.empty(3), np.empty((3, 3))
+    points = _samples(control, by.position)
+    d, slope, bend = np.empty(7), np.empty(3), np.empty((3, 3))
+    # no neighbour of a point farther away than this feels anything: an interpolated distance changes by
+    # at most √3 m a metre
+    felt_from_m = by.safe_m + 1.7320508075688772 * by.voxel_m
     for k in range(points.shape[0]):
-        cost_model(
-            d[7 * k : 7 * k + 7], frames[k], by.voxel_m, by.obstacle_weight, by.safe_m, by.hard_m, slope, bend
-        )
         pull = by.tether_weight[k]
+        x, y, z = points[k]
+        d[0] = _felt_m(x, y, z, k, by)
+        if d[0] >= felt_from_m and pull == 0.0:
+            continue
+        frame = _frame_at(control, k)
+        for e in range(3):
+            ex, ey, ez = by.voxel_m * frame[e, 0], by.voxel_m * frame[e, 1], by.voxel_m * frame[e, 2]
+            d[1 + 2 * e] = _felt_m(x + ex, y + ey, z + ez, k, by)
+            d[2 + 2 * e] = _felt_m(x - ex, y - ey, z - ez, k, by)
+        cost_model(d, frame, by.voxel_m, by.obstacle_weight, by.safe_m, by.hard_m, slope, bend)
         if pull > 0.0:
             for a in range(3):
                 slope[a] += 2.0 * pull * (points[k, a] - by.tether_m[k, a])
@@ -253,8 +256,8 @@ def _add_sample(
 
 
 @nb.njit(cache=True)
-def limit_rows(control: Float, h: float, limits: Float, bounds: Float) -> tuple[Float, Float]:
-    """Rows (R, 3n) and right sides (R,) of the QP: speed, acceleration and flight bounds.
+def limit_rows(control: Float, h: float, limits: Float, bounds: Float) -> Rows:
+    """Rows of the QP: speed, acceleration and flight bounds.
 
     Each norm limit is replaced by half spaces that touch its ball: where the present vector
     points, and for accelerations also around that. They hold the ball, so a QP without
@@ -263,46 +266,50 @@ def limit_rows(control: Float, h: float, limits: Float, bounds: Float) -> tuple[
     accelerations, and control points within 0.5 m of a bound get rows.
     """
     count = control.shape[0]
-    rows, sides = np.zeros((20 * count, 3 * (count - 6))), np.empty(20 * count)
+    most = 10 * count + 60
+    rows = Rows(np.empty((most, 9)), np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most))
     size = 0
-    stencil = np.array([[-1.0, 1.0, 0.0], [1.0, -2.0, 1.0]])
-    vector, normal = np.empty(3), np.empty(3)
     for order in range(2):
-        limit = limits[order] * h ** (1 + order)
         for i in range(2 - order, count - 3):
-            for axis in range(3):
-                vector[axis] = 0.0
-                for j in range(2 + order):
-                    vector[axis] += stencil[order, j] * control[i + j, axis]
-            norm = np.sqrt((vector * vector).sum())
-            hard = order == 1 and i <= _HARD_STARTS
-            if not hard and norm < NEAR_LIMIT * limit:
-                continue
-            frame = _frame(vector)
-            for turn in range(10 if hard else 1 + 2 * order):
-                sides[size] = limit
-                for axis in range(3):
-                    normal[axis] = (
-                        FAN[turn, 0] * frame[0, axis]
-                        + FAN[turn, 1] * frame[1, axis]
-                        + FAN[turn, 2] * frame[2, axis]
-                    )
-                    sides[size] -= normal[axis] * vector[axis]
-                for j in range(2 + order):
-                    if 3 <= i + j < count - 3:
-                        for axis in range(3):
-                            rows[size, 3 * (i + j - 3) + axis] = stencil[order, j] * normal[axis]
-                size += 1
+            size = _limit_rows(control, h, limits, order, i, rows, size)
     for i in range(3, count - 3):
         for axis in range(3):
             for side in range(2):
                 sign = 2.0 * side - 1.0  # -1 at the lower bound, 1 at the upper
                 room = sign * (bounds[side, axis] - control[i, axis])
                 if room < NEAR_BOUND_M:
-                    rows[size, 3 * (i - 3) + axis] = sign
-                    sides[size] = room
+                    rows.entries[size, 0], rows.width[size] = sign, 1
+                    rows.first[size], rows.upper[size] = 3 * (i - 3) + axis, room
                     size += 1
-    return rows[:size], sides[:size]
+    return Rows(rows.entries[:size], rows.first[:size], rows.width[:size], rows.upper[:size])
+
+
+@nb.njit(cache=True, inline="always")
+def _limit_rows(control: Float, h: float, limits: Float, order: int, i: int, rows: Rows, size: int) -> int:
+    """Add the rows of speed (order 0) or acceleration (1) from control point i on; their number then."""
+    stencil = _STENCILS[order]
+    vector = np.zeros(3)
+    for j in range(2 + order):
+        for axis in range(3):
+            vector[axis] += stencil[j] * control[i + j, axis]
+    limit, norm = limits[order] * h ** (1 + order), np.sqrt((vector * vector).sum())
+    hard = order == 1 and i <= _HARD_STARTS
+    if not hard and norm < NEAR_LIMIT * limit:
+        return size
+    frame = _frame(vector)
+    first, last = max(i, 3), min(i + 1 + order, control.shape[0] - 4)  # of the free points that it moves with
+    for turn in range(10 if hard else 1 + 2 * order):
+        rows.first[size], rows.width[size] = 3 * (first - 3), 3 * (last + 1 - first)
+        rows.upper[size] = limit
+        for axis in range(3):
+            normal = 0.0
+            for e in range(3):
+                normal += FAN[turn, e] * frame[e, axis]
+            rows.upper[size] -= normal * vector[axis]
+            for j in range(first, last + 1):
+                rows.entries[size, 3 * (j - first) + axis] = stencil[j - i] * normal
+        size += 1
+    return size
 
 
 @nb.njit(cache=True)
@@ -322,3 +329,20 @@ def line_search(control: Float, step: Float, by: Merit) -> tuple[Float, float]:
             return trial, (present - value) / present
         share *= 0.4
     return control, 0.0
+
+
+@nb.njit(cache=True)
+def advance(control: Float, by: Merit, bounds: Float) -> tuple[Float, float, bool]:
+    """One step: the control points (N, 3) it leads to, the share of the merit it gains, and if there is one.
+
+    Args:
+        control: (N, 3).
+        by: what a curve is judged by.
+        bounds: (2, 3) of the flight.
+    """
+    hessian, gradient = quadratic_model(control, by)
+    step, solved = solve_band_qp(hessian, gradient, limit_rows(control, by.h, by.limits, bounds), _BAND)
+    if not solved:
+        return control, 0.0, False
+    better, gained = line_search(control, step.reshape(-1, 3), by)
+    return better, gained, True

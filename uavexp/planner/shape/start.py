@@ -33,7 +33,7 @@ def refusal(start: Float, limits: Limits) -> str:
 def on_path(path_m: Float, velocity_mps: Float, max_acceleration_mps2: float) -> tuple[float, float]:
     """Speed along a path (P, 3), `STEP_M` apart, m/s, and the time lost to what of it is not, s."""
     ahead = path_m[min(round(TANGENT_M / STEP_M), len(path_m) - 1)] - path_m[0]
-    length = float(np.linalg.norm(ahead))
+    length = math.sqrt(float(ahead @ ahead))
     along = float(velocity_mps @ ahead) / length if length > 1e-9 else 0.0
     across = math.sqrt(max(float(velocity_mps @ velocity_mps) - along**2, 0.0))
     # a vehicle moving away needs v/a to stop and sqrt(2) v/a to come back

@@ -12,7 +12,7 @@ import numba as nb
 import numpy as np
 
 from uavexp.arrays import Float, Float32
-from uavexp.field import DistanceField, value_and_gradient
+from uavexp.field import DistanceField, interpolate
 from uavexp.planner.shape.scp_step import (
     EXCESS_WEIGHT,
     FAN,
@@ -169,7 +169,7 @@ def _obstacle_cost(
     points: Float, distance: Float32, origin_m: Float, voxel_m: float, safe_m: float, hard_m: float
 ) -> float:
     """Sum over points (S, 3) of c(d) = (1 - d/safe)₊² + 10 ((hard - d)/safe)₊²."""
-    d, _ = value_and_gradient(distance, origin_m, voxel_m, points)
+    d = interpolate(distance, origin_m, voxel_m, points)
     total = 0.0
     for k in range(len(points)):
         total += clearance_cost(d[k], safe_m, hard_m)
@@ -188,7 +188,7 @@ def _obstacle_model(
 ) -> tuple[Float, Float]:
     """Slope (S, 3) and curvature (S, 3, 3) of c at points (S, 3), each in its frame (3, 3) (`cost_model`)."""
     slope, bend = np.empty((len(points), 3)), np.empty((len(points), 3, 3))
-    d, _ = value_and_gradient(distance, origin_m, voxel_m, around(points, frame, voxel_m))
+    d = interpolate(distance, origin_m, voxel_m, around(points, frame, voxel_m))
     for k in range(len(points)):
         cost_model(d[7 * k : 7 * k + 7], frame[k], voxel_m, 1.0, safe_m, hard_m, slope[k], bend[k])
     return slope, bend

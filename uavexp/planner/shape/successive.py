@@ -25,10 +25,10 @@ from uavexp.planner.shape.timing import STEP_M, resample, smooth, time_profile
 from uavexp.trajectory import Trajectory
 from uavexp.types import Limits, PlanRequest, PlanStatus
 
-QP_SHARE = 0.96  # of the limits inside the QPs: room for their linearisation
+QP_SHARE = 0.99  # of the limits inside the QPs: room for their linearisation
 MOST_POINTS = 40  # control points
 _SMOOTHING_ROUNDS = 10  # takes the staircase out of a voxel path
-_STRETCH = 1.06  # least factor by which a duration is stretched
+_STRETCH = 1.02  # least factor by which a duration is stretched
 _STRETCH_GAIN = 0.99  # stretching ends unless it takes the excess below this share
 _HARD_ABOVE_VOXELS = 0.5  # the steep part of the obstacle cost begins this far above the hard limit
 

@@ -12,6 +12,7 @@ from functools import cache
 from math import factorial
 from typing import NamedTuple
 
+import numba as nb
 import numpy as np
 from scipy.interpolate import BSpline
 
@@ -109,8 +110,19 @@ def to_trajectory(power: Float, control: Float, h: float, start_s: float, at_res
         start_s: absolute time of the first knot.
         at_rest: whether it ends at rest.
     """
-    spans, terms = len(control) - len(power) + 1, np.arange(len(power))
-    windows = np.stack([control[j : j + spans] for j in terms], axis=1)  # (M, d+1, 3)
-    coefficients = np.einsum("ij,mjk->mik", power, windows) / h ** terms[:, None]
-    breaks: Float = start_s + h * np.arange(spans + 1.0)
+    coefficients: Float = _pieces(power, control, h)
+    breaks: Float = start_s + h * np.arange(len(coefficients) + 1.0)
     return Trajectory(breaks_s=breaks, coefficients=coefficients, at_rest=at_rest)
+
+
+@nb.njit(cache=True)
+def _pieces(power: Float, control: Float, h: float) -> Float:
+    """Coefficients (M, d+1, 3) of the spans, of t in seconds."""
+    terms = len(power)
+    out = np.zeros((len(control) - terms + 1, terms, 3))
+    for m in range(len(out)):
+        for i in range(terms):
+            for j in range(terms):
+                out[m, i] += power[i, j] * control[m + j]
+            out[m, i] /= h**i
+    return out

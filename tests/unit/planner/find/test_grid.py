@@ -32,6 +32,7 @@ class Search:
         self.grid = Grid(
             clearance_weight=changes.pop("clearance_weight", WEIGHT),
             max_expansions=changes.pop("max_expansions", 10_000_000),
+            slack=changes.pop("slack", 0.0),
         )
         kept = {"min_clearance_m": MIN_M, "safe_clearance_m": SAFE_M, "z_band_m": 10.0, "known_only": False}
         self.constraints = Constraints(limits=LIMITS, **(kept | changes))
@@ -71,8 +72,18 @@ def dijkstra_cost(field: DistanceField, start: tuple[int, ...], goal: tuple[int,
     return float(dijkstra(graph, indices=index[start])[index[goal]])
 
 
+def cost_along(field: DistanceField, path_m: Float) -> float:
+    """What the rule's words ask for a path through voxel centres."""
+    cells = np.floor(path_m / VOXEL_M + 1e-9).astype(int)
+    short = np.clip((SAFE_M - field.distance[tuple(cells.T)].astype(float)), 0.0, None)
+    penalty = WEIGHT * (short / (SAFE_M - MIN_M - 0.25 * VOXEL_M)) ** 2
+    length = VOXEL_M * np.linalg.norm(np.diff(cells, axis=0), axis=1)
+    return float((length * (1.0 + 0.5 * (penalty[1:] + penalty[:-1]))).sum())
+
+
+@pytest.mark.parametrize("slack", [0.0, 0.05, 0.3])
 @pytest.mark.parametrize("seed", range(6))
-def test_cost_is_the_least_by_dijkstra(seed: int) -> None:
+def test_cost_is_the_least_by_dijkstra_but_for_the_slack(seed: int, slack: float) -> None:
     rng = np.random.default_rng(seed)
     grid = empty((3.6, 3.2, 1.6))
     for _ in range(9):
@@ -80,7 +91,7 @@ def test_cost_is_the_least_by_dijkstra(seed: int) -> None:
         box(grid, tuple(corner), tuple(corner + rng.uniform(0.1, [0.7, 0.7, 1.6])))
     field = field_from(grid)
     open_ = np.argwhere(field.distance >= 0.3)
-    finder = Search()
+    finder = Search(slack=slack)
     for _ in range(5):
         start, goal = (tuple(int(v) for v in open_[rng.integers(len(open_))]) for _ in range(2))
         ends = (np.array([start, goal]) + 0.5) * VOXEL_M
@@ -90,7 +101,8 @@ def test_cost_is_the_least_by_dijkstra(seed: int) -> None:
             assert found.status is PlanStatus.NO_PATH
         else:
             assert found.status is PlanStatus.OK
-            assert found.cost == pytest.approx(expected, rel=3e-6)
+            assert expected * (1.0 - 1e-9) <= found.cost <= expected * (1.0 + slack) ** 2 * (1.0 + 3e-6)
+            assert found.cost == pytest.approx(cost_along(field, found.path_m))
             length = np.linalg.norm(np.diff(found.path_m, axis=0), axis=1)
             assert length.max() <= np.sqrt(3.0) * VOXEL_M + 1e-9  # neighbours only
             assert field.distance_m(found.path_m[1:-1]).min(initial=9.0) >= MIN_M
@@ -142,7 +154,7 @@ def test_statuses() -> None:
     assert Search().find(field, free, outside, limits).status is PlanStatus.GOAL_BLOCKED
     assert Search().find(field, free, beyond, limits).status is PlanStatus.OK
     assert Search(min_clearance_m=0.55).find(field, free, beyond, limits).status is PlanStatus.NO_PATH
-    few = Search(max_expansions=5).find(field, free, beyond, limits)
+    few = Search(max_expansions=5, min_clearance_m=0.05).find(field, free, beyond, limits)
     assert few.status is PlanStatus.NO_PATH
     assert "5 expansions" in few.reason
 

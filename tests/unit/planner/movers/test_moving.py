@@ -225,8 +225,8 @@ def test_without_movers_every_number_is_as_if_there_were_no_such_thing() -> None
 
 
 def test_in_a_corridor_it_passes_closer_or_steps_aside_and_never_touches() -> None:
-    """A corridor 2 m wide, and somebody in its middle who comes: the margin cannot be kept."""
-    walls = [((0.0, 0.0, 0.0), (14.0, 3.0, 3.0)), ((0.0, 5.0, 0.0), (14.0, 8.0, 3.0))]
+    """A corridor 1.7 m wide, and somebody in its middle who comes: the margin cannot be kept."""
+    walls = [((0.0, 0.0, 0.0), (14.0, 3.15, 3.0)), ((0.0, 4.85, 0.0), (14.0, 8.0, 3.0))]
     comes = tracks(((3.6, 4.2, 0.9), (-1.0, 0.0, 0.0), PERSON))
     result = plan(request(comes, walls=walls))
     assert result.status is PlanStatus.OK

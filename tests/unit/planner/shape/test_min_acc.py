@@ -75,7 +75,8 @@ def test_free_flight_is_the_cubic_of_least_acceleration() -> None:
     # (Pontryagin), reached by the cubic L (3 s² - 2 s³); the spline starts and ends at zero acceleration
     excess = []
     for spacing in (1.0, 0.4):
-        result = planner(duration_margin=2.0, control_spacing_m=spacing).plan(request(HALL, *FLIGHT))
+        free = planner(duration_margin=2.0, control_spacing_m=spacing, jerk_s=0.0)
+        result = free.plan(request(HALL, *FLIGHT))
         assert result.trajectory is not None
         duration = result.trajectory.duration_s
         position = sampled(result.trajectory)[0]
@@ -87,19 +88,30 @@ def test_free_flight_is_the_cubic_of_least_acceleration() -> None:
     assert 0.0 < excess[1] < excess[0] < 0.2
 
 
+def test_where_jerk_alone_counts_free_flight_is_the_quintic_of_least_jerk() -> None:
+    smooth = planner(duration_margin=2.0, control_spacing_m=0.6, jerk_s=100.0)
+    result = smooth.plan(request(HALL, *FLIGHT))
+    assert result.trajectory is not None
+    position = sampled(result.trajectory)[0]
+    s = np.linspace(0.0, 1.0, len(position))
+    quintic = 1.5 + 10.0 * (6.0 * s**5 - 15.0 * s**4 + 10.0 * s**3)
+    assert np.abs(position[:, 0] - quintic).max() < 0.005 * 10.0
+
+
 def test_free_flight_is_the_optimum_of_the_same_problem_in_casadi() -> None:
     limits = replace(LIMITS, max_speed_mps=4.0, max_acceleration_mps2=4.0)
     asked = request(HALL, *FLIGHT, velocity=(0.3, 0.4, 0.1), acceleration=(-0.5, 0.4, 0.0), target=False)
-    trajectory = planner(limits, duration_margin=2.5, tolerance=1e-9).plan(asked).trajectory
+    jerk_s = 0.5
+    trajectory = planner(limits, duration_margin=2.5, tolerance=1e-9, jerk_s=jerk_s).plan(asked).trajectory
     assert trajectory is not None
     segments, h = len(trajectory.breaks_s) - 1, float(np.diff(trajectory.breaks_s)[0])
     end_velocity = evaluate(trajectory, trajectory.breaks_s[-1:])[1][0]
-    opti, cost = ca.Opti("conic"), 0
+    opti, cost, rows = ca.Opti("conic"), 0, ca.DM(power_matrix(3))
     control = opti.variable(segments + 3, 3)
     for axis in range(3):
         for m in range(segments):
-            cost += segment_model()(control[m : m + 4, axis])[0]
-    rows = ca.DM(power_matrix(3))
+            window = control[m : m + 4, axis]
+            cost += segment_model()(window)[0] + (jerk_s / h) ** 2 * (6.0 * rows[3, :] @ window) ** 2
     ends = ((0, asked.position_m, asked.velocity_mps, asked.acceleration_mps2),)
     for first, position, velocity, acceleration in ends:
         window = control[first : first + 4, :]
