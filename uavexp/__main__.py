@@ -55,8 +55,11 @@ def _run(typed: Sequence[str]) -> int:
     if arguments.help:
         from uavexp.cli.helptext import group_names, help_text
 
-        group = next((word for word in arguments.overrides if word in group_names(folder)), None)
-        sys.stdout.write(help_text(folder, group))
+        words, groups = [word for word in arguments.overrides if "=" not in word], group_names(folder)
+        for word in words:
+            if word not in groups:
+                raise ConfigError(f"--help {word}: no such group; there are {', '.join(groups)}")
+        sys.stdout.write(help_text(folder, *words[:1]))
         return 0
 
     if arguments.info:

@@ -181,6 +181,7 @@ BAD = [
     ["--config-dir", "nowhere"],
     ["--cfg", "nonsense"],
     ["--help", "--nonsense"],
+    ["--help", "nope"],
     ["out=afile/inside"],
     ["out=afile"],
     ["out="],

@@ -228,6 +228,8 @@ def test_a_trial_that_fails_costs_itself_alone_and_is_flown_again(tmp_path: Path
     done = run(*typed, *runner, **TRUST)
     assert done.returncode == 1
     assert done.stderr == ""
+    assert "trigger.deed=raise seed 0 raised: ZeroDivisionError" in done.stdout
+    assert "  in tests/jobs.py:" in done.stdout, "its last frame"
     trials = pd.read_parquet(folder / "trials.parquet").set_index("p_trigger_deed")
     assert trials["status"].to_dict() == {
         "raise": "raised", "segfault": "killed", "kill": "killed",

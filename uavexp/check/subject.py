@@ -42,7 +42,12 @@ def subjects(composer: Composer, settings: Sequence[Setting]) -> list[Subject]:
     chosen = [(item.key, str(option)) for item in settings if item.key in GROUPS for option in item.values]
     values = [item for item in settings if item.key not in GROUPS]
     for item in values:
-        if item.key.split(".")[0] not in dict(chosen):
+        group = item.key.split(".")[0]
+        if group in GROUPS and group not in dict(chosen):
+            inside = f"{group}={composer.compose([])['hydra']['runtime']['choices'][group]}"
+            typed = f"{item.key}={','.join(map(str, item.values))}"
+            raise ConfigError(f"check {item.key} inside a {group}: {inside} {typed}")
+        if group not in dict(chosen):
             raise ConfigError(f"{item.key} is no parameter of an option that is checked")
         if len(item.values) > 1:
             raise ConfigError(f"{item.key} must have one value, got {', '.join(map(str, item.values))}")

@@ -12,14 +12,22 @@ from uavexp.store.table import Row
 _CAUSES = "replans_"
 
 
-def trial_table(rows: Sequence[Row]) -> Table:
-    """One line per trial."""
+def trial_table(rows: Sequence[Row], axes: Sequence[str]) -> Table:
+    """One line per trial.
+
+    Args:
+        rows: of `trials.parquet`.
+        axes: columns that tell cells apart; shown are those in which rows differ, in more than strategy.
+    """
+    differ = [axis for axis in axes if len({row[axis] for row in rows}) > 1]
+    varied = [axis for axis in differ if any(row[axis] != row["strategy"] for row in rows)]
     table = _table(
-        ("strategy", "world", "seed", "outcome"),
+        (*varied, "strategy", "world", "seed", "outcome"),
         ("contacts", "time s", "path m", "shortest m", "replans", "clearance m", "tracking m", "wall s"),
     )
     for row in rows:
         table.add_row(
+            *(row[axis] for axis in varied),
             row["strategy"],
             row["world"],
             str(row["seed"]),

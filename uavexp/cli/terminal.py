@@ -20,7 +20,7 @@ from rich.progress import (
 )
 
 from uavexp.cli.summary import cell_table, trial_table
-from uavexp.store.records import PICTURE
+from uavexp.store.records import PICTURE, read_record
 from uavexp.store.study import TRIALS
 from uavexp.store.table import pooled_versions
 
@@ -127,21 +127,25 @@ class Terminal:
 
     def _summary(self, agenda: Agenda, rows: Sequence[Row]) -> None:
         """Tables of trials, how to repeat them, and their pictures."""
-        commands = {job.name: job.payload.command for job in agenda.jobs}
+        jobs, trials = {job.name: job for job in agenda.jobs}, agenda.study.folder / TRIALS
         if pooled := pooled_versions((row["code"], row["lock"]) for row in rows):
             self.say(pooled)
-        rows = [row for row in rows if row["trial"] in commands]
+        rows = [row for row in rows if row["trial"] in jobs]
         few = len(rows) <= _MAX_ROWS
         # as wide as it needs: a cut-off number is worse than a wrapped line
         wide = Console(file=self._console.file, width=_TABLE_WIDTH)
-        wide.print(trial_table(rows) if few else cell_table(rows, list(agenda.study.axes)))
+        wide.print((trial_table if few else cell_table)(rows, list(agenda.study.axes)))
         for row in rows if few else [row for row in rows if row["status"] != "ok"][:_MAX_FAILURES]:
             if row["reason"]:
                 ending = f"ended {row['outcome']}" if row["status"] == "ok" else str(row["status"])
-                self.say(f"{row['strategy']} seed {row['seed']} {ending}: {row['reason']}")
+                self.say(f"{jobs[row['trial']].label} {ending}: {row['reason']}")
+            for frame in (
+                read_record(trials / row["trial"])["traceback"][-1:] if row["status"] == "raised" else []
+            ):
+                self.say(f"  in {frame}")
         for row in rows if few else []:
-            self.say(f"repeat:  {commands[row['trial']]}")
-            if (picture := agenda.study.folder / TRIALS / row["trial"] / PICTURE).exists():
+            self.say(f"repeat:  {jobs[row['trial']].payload.command}")
+            if (picture := trials / row["trial"] / PICTURE).exists():
                 self.say(f"picture: {picture}")
 
     def _report(self, folder: Path) -> None:
