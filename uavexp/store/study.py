@@ -223,7 +223,7 @@ def _read(file: Path, wanted: Callable[[str], bool] = lambda name: True) -> pd.D
     try:
         columns = [name for name in parquet.read_schema(file).names if wanted(name)]
         table = parquet.read_table(file, columns=columns, page_checksum_verification=True)
-        frame: pd.DataFrame = table.to_pandas(split_blocks=True, self_destruct=True)
+        frame: pd.DataFrame = table.to_pandas()
         return frame
     except (OSError, ArrowException) as error:
         raise RecordError(f"{file}: cannot be read ({error})") from error
