@@ -2,7 +2,7 @@
 
     python benchmarks/mapping_bench.py
 
-prints integration and ESDF update times, and how much faster the incremental update is than
+prints integration and ESDF update times, and how much faster the update is than
 scipy's exact transform of the whole map. `measure` also takes any other list of scans.
 """
 

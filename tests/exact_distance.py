@@ -1,4 +1,4 @@
-"""Scipy's exact distance transform as the oracle of the incremental one."""
+"""Scipy's exact distance transform as the oracle of the one kept by windows."""
 
 from __future__ import annotations
 

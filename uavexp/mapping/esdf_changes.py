@@ -6,7 +6,7 @@ import numba as nb
 import numpy as np
 
 from uavexp.arrays import Float32, Int32, UInt8
-from uavexp.mapping.esdf_kernels import Int16
+from uavexp.mapping.esdf_kernels import Int16, widen
 
 
 @nb.njit(cache=True)
@@ -86,5 +86,4 @@ def mark_seen(shape: tuple[int, int, int], voxels: Int32, seen: UInt8, touched: 
         column = voxels[n] // nz
         x, y = column // ny, column % ny
         seen[voxels[n]] = 1
-        touched[x, 0] = min(touched[x, 0], y)
-        touched[x, 1] = max(touched[x, 1], y + 1)
+        widen(touched, x, y, y + 1)

@@ -1,4 +1,4 @@
-"""The incremental signed distance transform against scipy's exact one and against closed forms."""
+"""The signed distance transform, kept by windows, against scipy's exact one and against closed forms."""
 
 from __future__ import annotations
 
