@@ -67,21 +67,19 @@ class _Stages:
     """The three stages of one transform, towards occupied or towards other voxels."""
 
     def __init__(self, shape: tuple[int, int, int], cap: int, start: int) -> None:
-        """Begin with the same square everywhere."""
+        """Begin with the square `start` everywhere; the arrays hold what it is more or less than that."""
         size = math.prod(shape)
-        self.shape, self.cap = shape, cap
-        self.along_z, self.along_y, self.along_x = (  # flat
-            np.full(size, start, np.int16) if start else blank(size, np.int16) for _ in range(3)
-        )
-        self._bound_y = self._bound_x = start  # nothing in the latter two exceeds these
+        self.shape, self.cap, self.start = shape, cap, start
+        self.along_z, self.along_y, self.along_x = (blank(size, np.int16) for _ in range(3))  # flat
+        self._bound_y = self._bound_x = 0  # nothing in the latter two exceeds these
 
     def update(self, changed: Int32, touched: Int32) -> None:
         """Carry on what has changed along z in windows (X, 2), and widen `touched`."""
         changed, self._bound_y = along_y(
-            self.shape, self.cap, self._bound_y, self.along_z, self.along_y, changed
+            self.shape, self.cap, self.start, self._bound_y, self.along_z, self.along_y, changed
         )
         self._bound_x = along_x(
-            self.shape, self.cap, self._bound_x, self.along_y, self.along_x, changed, touched
+            self.shape, self.cap, self.start, self._bound_x, self.along_y, self.along_x, changed, touched
         )
 
 
@@ -104,7 +102,7 @@ class SignedDistance:
         self.distance: Float32 = np.full(shape, max_distance_m, np.float32)
         self._outside = _Stages(shape, self.cap, self.cap)
         self._inside = _Stages(shape, self.cap, 0)
-        self._published = np.full(size, self.cap, np.int16)
+        self._published = blank(size, np.int16)  # outside less inside, as the stages hold them
         self._seen = blank(size, np.uint8)
         self._flagged = np.zeros(nx * ny, np.uint8)
         self._touched = no_windows(shape)
@@ -144,7 +142,7 @@ class SignedDistance:
         log: tuple[Any, ...] = tuple(np.empty(total + 1, kind) for kind in kinds)
         emit(
             self._begins[:parts], self._ends[:parts], self._outside.along_x, self._inside.along_x,
-            self._published, self._seen, self._table, self.cap, self.max_distance_m,
+            self._published, self._seen, self._table, 2 * self.cap, self.max_distance_m,
             self.distance.reshape(-1), *log,
         )  # fmt: skip
         voxel, old, new, fresh, occupied = (array[:total] for array in log)

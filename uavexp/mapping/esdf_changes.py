@@ -41,10 +41,13 @@ def list_changed(
 @nb.njit(cache=True)
 def emit(
     begins: Int32, ends: Int32, outside: Int16, inside: Int16, published: Int16, seen: UInt8,
-    table: Float32, cap: int, max_distance_m: float, distance: Float32,
+    table: Float32, empty: int, max_distance_m: float, distance: Float32,
     voxel: Int32, old: Float32, new: Float32, first_seen: UInt8, occupied: UInt8,
 ) -> None:  # fmt: skip
-    """Publish the distances of the listed parts and write the change log (with one spare row)."""
+    """Publish the distances of the listed parts and write the change log (with one spare row).
+
+    Row `empty` of the table is the distance in an empty map.
+    """
     beyond = np.float32(max_distance_m)
     count = np.uint64(0)  # unsigned: numba then leaves out the test for negative indices
     for n in range(begins.shape[0]):
@@ -53,7 +56,7 @@ def emit(
         was, fresh, metres = published[begin:end], seen[begin:end], distance[begin:end]
         for k in range(end - begin):  # every row is written, and kept when it changed: no branches
             value = np.int16(far[k] - near[k])
-            after = table[np.uint64(value + cap)]
+            after = table[np.uint64(value + empty)]
             voxel[count] = begin + k
             old[count] = beyond if fresh[k] else metres[k]
             new[count] = after

@@ -1,8 +1,9 @@
 """Kernels of the distance transform by windows; `esdf` says what they compute.
 
 Fields are flat, C order with z contiguous, so that a run of neighbouring columns is one
-contiguous piece of memory. Windows (X, 2) are a range of y for each plane of one x, begin and
-end; begin >= end: none.
+contiguous piece of memory. Squares are kept less `start`, what they are in an empty map: zeros
+begin them, and where nothing is seen they take no memory. Windows (X, 2) are a range of y for
+each plane of one x, begin and end; begin >= end: none.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ def widen(windows: Int32, x: int, begin: int, end: int) -> None:
 
 @nb.njit(cache=True)
 def _largest(run: Int16) -> int:
-    largest = np.int16(0)
+    largest = run[0]
     for k in range(run.shape[0]):
         largest = max(largest, run[k])
     return int(largest)
@@ -67,7 +68,7 @@ def _lower_both(target: Int16, one: Int16, other: Int16, add: int) -> None:
 
 
 @nb.njit(cache=True)
-def _lowest(source: Int16, begin: int, stride: int, low: int, high: int, out: Int16) -> int:
+def _lowest(source: Int16, begin: int, stride: int, low: int, high: int, start: int, out: Int16) -> int:
     """Fill `out` (N,) with the least, over whole n, of source[begin + n stride ...] + n^2; its largest.
 
     Only what lies in the flat interval [low, high) of `source` counts.
@@ -76,7 +77,7 @@ def _lowest(source: Int16, begin: int, stride: int, low: int, high: int, out: In
     out[:] = source[begin : begin + size]
     largest = _largest(out)
     n = 1
-    while n * n < largest:
+    while n * n < largest + start:
         before, after = source[max(begin - n * stride, low) :], source[begin + n * stride :]
         first = min(max(low - begin + n * stride, 0), size)  # of those with a neighbour before them
         last = max(min(high - begin - n * stride, size), 0)  # one beyond those with one after them
@@ -135,6 +136,7 @@ def along_z(
                 continue
             column = slice((x * ny + y) * nz, (x * ny + y + 1) * nz)
             _scan_column(state[column], cap, far, near)
+            far -= np.int16(cap)
             for fresh, squares, windows in ((far, outside, out_windows), (near, inside, in_windows)):
                 if _differ(fresh, squares[column]):
                     squares[column] = fresh
@@ -144,19 +146,19 @@ def along_z(
 
 @nb.njit(cache=True)
 def along_y(
-    shape: tuple[int, int, int], cap: int, bound: int, g: Int16, h: Int16, changed: Int32
+    shape: tuple[int, int, int], cap: int, start: int, bound: int, g: Int16, h: Int16, changed: Int32
 ) -> tuple[Int32, int]:
     """Compute h anew where a change of g can be felt; windows of what changed, upper bound of all h."""
     nx, ny, nz = shape
     windows, fresh = no_windows(shape), np.empty(ny * nz, np.int16)
-    reach, largest = _reach(bound, cap), bound
+    reach, largest = _reach(bound + start, cap), bound
     for x in range(nx):
         if changed[x, 0] >= changed[x, 1]:
             continue
         low, high = x * ny * nz, (x + 1) * ny * nz
         y0, y1 = max(changed[x, 0] - reach, 0), min(changed[x, 1] + reach, ny)
         out = fresh[: (y1 - y0) * nz]
-        largest = max(largest, _lowest(g, low + y0 * nz, nz, low, high, out))
+        largest = max(largest, _lowest(g, low + y0 * nz, nz, low, high, start, out))
         for y in range(y0, y1):
             new, old = out[(y - y0) * nz : (y - y0 + 1) * nz], h[low + y * nz : low + (y + 1) * nz]
             if _differ(new, old):
@@ -167,18 +169,19 @@ def along_y(
 
 @nb.njit(cache=True)
 def along_x(
-    shape: tuple[int, int, int], cap: int, bound: int, h: Int16, f: Int16, changed: Int32, touched: Int32
-) -> int:
+    shape: tuple[int, int, int], cap: int, start: int, bound: int, h: Int16, f: Int16, changed: Int32,
+    touched: Int32,
+) -> int:  # fmt: skip
     """Compute f anew where a change of h can be felt, and widen `touched` by it; upper bound of all f."""
     nx, ny, nz = shape
     plane = ny * nz
-    reach, largest = _reach(bound, cap), bound
+    reach, largest = _reach(bound + start, cap), bound
     for x in range(nx):
         y0, y1 = ny, 0
         for other in range(max(x - reach, 0), min(x + reach + 1, nx)):
             y0, y1 = min(y0, changed[other, 0]), max(y1, changed[other, 1])
         if y0 < y1:
             begin, end = x * plane + y0 * nz, x * plane + y1 * nz
-            largest = max(largest, _lowest(h, begin, plane, 0, nx * plane, f[begin:end]))
+            largest = max(largest, _lowest(h, begin, plane, 0, nx * plane, start, f[begin:end]))
             widen(touched, x, y0, y1)
     return largest
