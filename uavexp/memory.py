@@ -16,7 +16,7 @@ def blank(size: int, kind: type[np.generic]) -> npt.NDArray[Any]:
 
     numpy's own come in pages of 2 MB, and of a large map a flight touches something in nearly each.
     """
-    if size < _LARGE:
+    if size < _LARGE or not hasattr(mmap, "MADV_NOHUGEPAGE"):  # which Linux alone has
         return np.zeros(size, kind)
     memory = mmap.mmap(-1, size * np.dtype(kind).itemsize, mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
     memory.madvise(mmap.MADV_NOHUGEPAGE)
