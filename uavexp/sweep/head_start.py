@@ -13,7 +13,7 @@ PRELOAD = "uavexp.sweep.preload"
 
 
 def give_head_start(settings: Sequence[Setting]) -> None:
-    """Start the fork server if these settings will need it and it has kernels to load."""
+    """Start the fork server if these settings will need it, and no kernels are compiled first."""
     if has_kernels() and _need_fork_server(settings):
         start_fork_server([PRELOAD])
 

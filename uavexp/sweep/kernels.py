@@ -1,8 +1,7 @@
-"""Compiled kernels of the modules that are imported: which there are, and loading them at once.
+"""Whether the kernels of the modules that are imported are compiled.
 
 This reads numba's private index of compiled signatures. Should a later numba keep it
-elsewhere, none is found, and every process loads its own when it calls them: slower,
-equally right.
+elsewhere, none is found, and every command flies once to compile: slower, equally right.
 """
 
 from __future__ import annotations
@@ -15,17 +14,6 @@ from typing import Any
 def is_compiled() -> bool:
     """Whether any kernel is there in its present version (else a minute of compiling lies ahead)."""
     return any(_signatures(kernel) for kernel in _kernels())
-
-
-def load() -> int:
-    """Load every compiled kernel from numba's cache; returns how many signatures there were.
-
-    None is called: a role would call Open3D too, whose threads do not survive a fork.
-    """
-    found = [(kernel, signature) for kernel in _kernels() for signature in _signatures(kernel)]
-    for kernel, signature in found:
-        kernel.compile(signature)
-    return len(found)
 
 
 def _kernels() -> Iterator[Any]:

@@ -1,4 +1,7 @@
-"""Imported once by the fork server: all that a flight imports, with its compiled kernels loaded."""
+"""Imported once by the fork server: all that a flight imports.
+
+A child loads the kernels that its flights call, about fifty of three hundred, and flies many.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,6 @@ import importlib
 import pkgutil
 
 from uavexp.config.build import GROUPS
-from uavexp.sweep import kernels
 
 _ALSO = ("uavexp.trial", "uavexp.metrics", "uavexp.sweep.trial_job")
 
@@ -23,5 +25,4 @@ def _import_everything() -> None:
 
 
 _import_everything()
-kernels.load()
 gc.freeze()  # or the first collection in a child copies every page it was given
