@@ -16,7 +16,7 @@ LAYERS = (
     {"arrays", "errors", "kernel_cache", "memory"},
     {"field", "trajectory", "seeding", "paths", "geometry", "o3d"},
     {"types", "scan", "log", "causes", "parameters", "map_change", "path_clearance"},
-    {"braking", "triangle_grid", "bodies", "scene"},
+    {"braking", "triangle_grid", "bodies", "scene", "formats"},
     {"cloud"},
     {"roles", "metrics", "inspection"},
     {"recorder", "pilot", "motion", "trial"},

@@ -9,12 +9,13 @@ from typing import Annotated, Literal
 
 import numpy as np
 
+from uavexp import formats
 from uavexp.arrays import Bool, Float, Float32, Int32
 from uavexp.errors import WorldError, require
 from uavexp.parameters import Constraint, Finite, NonNegative, Positive, Vector, option
 from uavexp.scene import Scene
 from uavexp.types import World
-from uavexp.world import readers, ros_map, task
+from uavexp.world import task
 from uavexp.world.voxel_mesh import exposed_faces
 
 # rows of the rotation that turns each up axis to +z
@@ -73,7 +74,6 @@ class File:
 
     def generate(self, rng: np.random.Generator) -> World:
         """Return the world; raise `WorldError` in one line when file or task is unusable."""
-        readers.check_file(Path(self.path))
         vertices, triangles = self._geometry()
         flight_bounds = self._checked_bounds(vertices)
         bounds = flight_bounds + np.array([[-MAP_MARGIN_M], [MAP_MARGIN_M]])
@@ -106,25 +106,19 @@ class File:
 
     def _geometry(self) -> tuple[Float32, Int32]:
         """Triangles of the file, in m, z up."""
-        path = Path(self.path)
-        suffix = path.suffix.lower()
-        if suffix in readers.MAPS:
+        options = formats.Options(wall_height_m=self.wall_height_m)
+        content = formats.read(Path(self.path), options)
+        if content.cells is not None and content.cells.is_plan:
             require(
                 self.unit_m == 1.0 and self.up_axis == "z",
                 "unit_m and up_axis do not apply to a ROS map, which is in m with z up",
             )
-            return self._extruded(ros_map.read(path))
-        if suffix in readers.VOXELS:
-            voxels = readers.read_voxels(path)
-            size = voxels.resolution * self.unit_m
-            free = None if voxels.free is None else self._converted(voxels.free)
-            return self._meshed(self._converted(voxels.occupied), free, size)
-        if suffix == ".pcd" or (suffix == ".ply" and readers.ply_counts(path)[1] == 0):
-            points = self._converted(readers.read_cloud(path))
-            points = (np.floor(points / self.voxel_size_m) + 0.5) * self.voxel_size_m
-            return self._meshed(points, None, self.voxel_size_m)
-        vertices, triangles = readers.read_mesh(path)
-        return self._converted(vertices).astype(np.float32), triangles
+            return self._extruded(content.cells)
+        if content.cells is not None:
+            return self._meshed(self._upright(content.cells))
+        if content.points.shape[0]:
+            return self._meshed(self._voxels(self._converted(content.points)))
+        return self._converted(content.vertices).astype(np.float32), content.triangles
 
     def _converted(self, points: Float) -> Float:
         """Turn the file's up axis to +z and its unit to m; refuse what float32 cannot hold."""
@@ -137,38 +131,53 @@ class File:
             )
         return points
 
-    def _meshed(self, occupied: Float, free: Float | None, size_m: float) -> tuple[Float32, Int32]:
-        """Surface of voxels given by their centres; only the mapped box counts when bounds are given."""
+    def _upright(self, cells: formats.Cells) -> formats.Cells:
+        """The same cells in m, z up."""
+        turn = np.array(UP_AXES[self.up_axis], dtype=np.int64)
+        source = np.abs(turn).argmax(axis=1)  # the file's axis that becomes each of ours
+        state = np.transpose(cells.state, source)
+        far = cells.origin + cells.size * cells.state.shape
+        corners = self._converted(np.stack([cells.origin, far]))
+        flipped = tuple(slice(None, None, int(sign)) for sign in turn[np.arange(3), source])
+        return formats.Cells(
+            state=state[flipped], origin=corners.min(axis=0), size=self.unit_m * cells.size[source]
+        )
+
+    def _voxels(self, points: Float) -> formats.Cells:
+        """Cells of `voxel_size_m` that hold points (N, 3), the others free; within the bounds when given."""
+        size = self.voxel_size_m
         if self.flight_bounds_m is not None:
             low, high = np.array(self.flight_bounds_m)
-            near = ((occupied > low - MAP_MARGIN_M) & (occupied < high + MAP_MARGIN_M)).all(axis=1)
-            if not near.any():
+            points = points[((points > low - MAP_MARGIN_M) & (points < high + MAP_MARGIN_M)).all(axis=1)]
+            if not points.shape[0]:
                 raise WorldError(f"{self.path}: nothing lies within flight_bounds_m; is unit_m right?")
-            occupied = occupied[near]
-            free = None if free is None else free[((free > low) & (free < high)).all(axis=1)]
-        known = occupied if free is None else np.concatenate([occupied, free])
-        corner = known.min(axis=0)
-        self._check_memory(np.stack([corner, known.max(axis=0) + size_m]), size_m, 2)
-        shape = np.rint((known.max(axis=0) - corner) / size_m).astype(np.int64) + 1
-        grid: Bool = np.zeros(shape, dtype=np.bool_)
-        if free is not None and self.unknown == "wall":
-            grid[:] = True
-            grid[tuple(np.rint((free - corner) / size_m).astype(np.int64).T)] = False
-        grid[tuple(np.rint((occupied - corner) / size_m).astype(np.int64).T)] = True
-        return exposed_faces(grid, corner - 0.5 * size_m, np.full(3, size_m))
+        index = np.floor(points / size).astype(np.int64)
+        first, last = index.min(axis=0), index.max(axis=0)
+        self._check_memory(size * np.stack([first, last + 1]), size, 2)
+        state = np.full(last - first + 1, formats.FREE, dtype=np.uint8)
+        state[tuple((index - first).T)] = formats.SOLID
+        return formats.Cells(state=state, origin=first * size, size=np.full(3, size))
 
-    def _extruded(self, plan: ros_map.RosMap) -> tuple[Float32, Int32]:
-        """Walls of a map up to `wall_height_m`, with floor and ceiling over its whole extent."""
-        solid = plan.occupied | plan.unknown if self.unknown == "wall" else plan.occupied
+    def _meshed(self, cells: formats.Cells) -> tuple[Float32, Int32]:
+        """Surface of cells."""
+        return exposed_faces(self._solid(cells), cells.origin, cells.size)
+
+    def _solid(self, cells: formats.Cells) -> Bool:
+        solid: Bool = cells.state == formats.SOLID
+        return solid | (cells.state == formats.UNMEASURED) if self.unknown == "wall" else solid
+
+    def _extruded(self, plan: formats.Cells) -> tuple[Float32, Int32]:
+        """Walls of a plan, with floor and ceiling over its whole extent."""
+        solid = self._solid(plan)[..., 0]
         layers = np.ones((*solid.shape, 3), dtype=np.bool_)
         layers[..., 1] = solid
-        vertices, triangles = exposed_faces(layers, np.zeros(3), np.array([plan.resolution_m] * 2 + [1.0]))
+        vertices, triangles = exposed_faces(layers, np.zeros(3), np.array([*plan.size[:2], 1.0]))
         heights = np.array([-0.1, 0.0, self.wall_height_m, self.wall_height_m + 0.1], dtype=np.float32)
         vertices[:, 2] = heights[np.rint(vertices[:, 2]).astype(np.int64)]
         c, s = math.cos(plan.yaw_rad), math.sin(plan.yaw_rad)
         x, y = vertices[:, 0].astype(np.float64), vertices[:, 1].astype(np.float64)
-        vertices[:, 0] = plan.origin_m[0] + c * x - s * y
-        vertices[:, 1] = plan.origin_m[1] + s * x + c * y
+        vertices[:, 0] = plan.origin[0] + c * x - s * y
+        vertices[:, 1] = plan.origin[1] + s * x + c * y
         return vertices, triangles
 
     def _checked_bounds(self, vertices: Float32) -> Float:

@@ -8,10 +8,10 @@ import pytest
 
 from tests.folders import DATA
 from uavexp.errors import ConfigError, UavexpError, WorldError
+from uavexp.formats import ros_map
 from uavexp.geometry import polyline_length_m
 from uavexp.scene import Scene
 from uavexp.types import World
-from uavexp.world import ros_map
 from uavexp.world.file import UP_AXES, File
 from uavexp.world.voxel_mesh import exposed_faces
 
