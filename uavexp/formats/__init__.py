@@ -5,76 +5,83 @@ Every fault is one `WorldError` line that names the file, the reason and what to
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import errno
+import os
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 
-import numpy as np
-
-from uavexp.arrays import Float
-from uavexp.formats import older, ros_map
+from uavexp.errors import WorldError
 from uavexp.formats.base import FREE, SOLID, UNMEASURED, Cells, Content, Options
 
-__all__ = ["FREE", "READERS", "SOLID", "UNMEASURED", "Cells", "Content", "Options", "read"]
+__all__ = ["FREE", "READERS", "SOLID", "UNMEASURED", "Cells", "Content", "Options", "files", "read"]
+
+# suffix to its module here, which has `read(path, options)`, and `files(path)` where a file names others;
+# a module is imported when a file needs it, and imports at its top the library that it needs
+READERS = {
+    ".ply": "older",
+    ".obj": "older",
+    ".stl": "older",
+    ".glb": "older",
+    ".pcd": "older",
+    ".npz": "older",
+    ".yaml": "older",
+    ".yml": "older",
+}
+# modules of the extra `formats` by their packages' names
+PACKAGES = {"collada": "pycollada", "ezdxf": "ezdxf", "laspy": "laspy", "shapely": "shapely"}
 
 
 def read(path: Path, options: Options) -> Content:
     """Return what a file holds; raise `WorldError` in one line when it cannot be read whole."""
-    older.check_file(path)
-    return READERS[path.suffix.lower()](path, options)
+    _check_file(path)
+    content: Content = _module(path).read(path, options)
+    return content
 
 
-def _mesh(path: Path, options: Options) -> Content:
-    vertices, triangles = older.read_mesh(path)
-    return Content(kind=f"{path.suffix[1:].lower()} mesh", vertices=vertices, triangles=triangles)
+def files(path: Path) -> tuple[Path, ...]:
+    """Return the files that a file's content depends on, itself first; any suffix is allowed.
+
+    Raises:
+        OSError: the file itself does not exist.
+        WorldError: it is damaged where it names the others.
+    """
+    if not path.is_file():
+        raise FileNotFoundError(errno.ENOENT, "no such file", str(path))
+    if path.suffix.lower() not in READERS:
+        return (path,)
+    named = getattr(_module(path), "files", None)
+    others: tuple[Path, ...] = named(path) if named else ()
+    for other in others:
+        if not other.is_file():  # nor read from a device or a pipe
+            raise WorldError(f"world file {path} names {other}, which is no file")
+    return (path, *others)
 
 
-def _cloud(path: Path, options: Options) -> Content:
-    return Content(kind=f"{path.suffix[1:].lower()} cloud", points=older.read_cloud(path))
+def _module(path: Path) -> ModuleType:
+    try:
+        return import_module(f"uavexp.formats.{READERS[path.suffix.lower()]}")
+    except ModuleNotFoundError as error:
+        if error.name not in PACKAGES:
+            raise
+        raise WorldError(
+            f"world file {path}: reading {path.suffix} needs {PACKAGES[error.name]}: "
+            "pip install 'uavexp[formats]'"
+        ) from error
 
 
-def _ply(path: Path, options: Options) -> Content:
-    return (_mesh if older.ply_counts(path)[1] else _cloud)(path, options)
-
-
-def _npz(path: Path, options: Options) -> Content:
-    voxels = older.read_voxels(path)
-    return Content(kind="npz voxels", cells=_cells(voxels.occupied, voxels.free, voxels.resolution))
-
-
-def _cells(occupied: Float, free: Float | None, size: float) -> Cells:
-    """Cells of the centres (N, 3) of voxels; without measured free ones all others are free."""
-    known = occupied if free is None else np.concatenate([occupied, free])
-    corner = known.min(axis=0)
-    shape = np.rint((known.max(axis=0) - corner) / size).astype(np.int64) + 1
-    state = np.full(shape, FREE if free is None else UNMEASURED, dtype=np.uint8)
-    if free is not None:
-        state[tuple(np.rint((free - corner) / size).astype(np.int64).T)] = FREE
-    state[tuple(np.rint((occupied - corner) / size).astype(np.int64).T)] = SOLID
-    return Cells(state=state, origin=corner - 0.5 * size, size=np.full(3, size))
-
-
-def _plan(path: Path, options: Options) -> Content:
-    plan = ros_map.read(path)
-    state = np.where(plan.occupied, SOLID, np.where(plan.unknown, UNMEASURED, FREE)).astype(np.uint8)
-    return Content(
-        kind="ROS map",
-        cells=Cells(
-            state=state[..., None],
-            origin=np.array([*plan.origin_m, 0.0]),
-            size=np.array([plan.resolution_m, plan.resolution_m, options.wall_height_m]),
-            yaw_rad=plan.yaw_rad,
-            is_plan=True,
-        ),
-    )
-
-
-READERS: dict[str, Callable[[Path, Options], Content]] = {
-    ".ply": _ply,
-    ".obj": _mesh,
-    ".stl": _mesh,
-    ".glb": _mesh,
-    ".pcd": _cloud,
-    ".npz": _npz,
-    ".yaml": _plan,
-    ".yml": _plan,
-}
+def _check_file(path: Path) -> None:
+    """Raise `WorldError` unless `path` is a readable file of a known suffix with something in it."""
+    if not path.exists():
+        raise WorldError(f"world file {path} does not exist")
+    if not path.is_file():
+        raise WorldError(f"world file {path} is not a file; one of {' '.join(READERS)} is needed")
+    if not os.access(path, os.R_OK):
+        raise WorldError(f"world file {path} cannot be read (permission denied)")
+    if path.stat().st_size == 0:
+        raise WorldError(f"world file {path} is empty (0 bytes)")
+    if path.suffix.lower() not in READERS:
+        raise WorldError(
+            f"world file {path} has the extension {path.suffix!r}; one of {' '.join(READERS)} is needed"
+            + (" (give the map's yaml, not its image)" if path.suffix.lower() == ".pgm" else "")
+        )

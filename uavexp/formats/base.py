@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
-from uavexp.arrays import Float, Int32, UInt8
+from uavexp.arrays import Float, Int, Int32, UInt8
+from uavexp.errors import WorldError
 
 UNMEASURED, FREE, SOLID = 0, 1, 2  # states of a cell
 
@@ -44,3 +46,49 @@ class Options:
 
     wall_height_m: float = 2.5  # to which a plan is extruded from z = 0
     layers: tuple[str, ...] = ()  # of a drawing that are walls; none: all of them
+
+
+def mesh(path: Path, kind: str, vertices: Float, triangles: Int, warnings: tuple[str, ...] = ()) -> Content:
+    """Return the content of a mesh file.
+
+    Args:
+        path: named in the errors.
+        kind: see `Content`.
+        vertices: (V, 3).
+        triangles: (F, 3), indices of vertices.
+        warnings: see `Content`.
+
+    Raises:
+        WorldError: no triangle, a vertex that is not finite, an index that names no vertex.
+    """
+    if triangles.shape[0] == 0:
+        raise WorldError(f"world file {path} holds no triangles")
+    finite = np.isfinite(vertices).all(axis=1)
+    if not finite.all():
+        bad = int(np.count_nonzero(~finite))
+        raise WorldError(f"world file {path} has {bad} vertices that are NaN or infinite")
+    low, high = int(triangles.min()), int(triangles.max())
+    if low < 0 or high >= vertices.shape[0]:
+        wrong = low if low < 0 else high
+        raise WorldError(
+            f"world file {path} is damaged: a triangle names vertex {wrong} of {vertices.shape[0]}"
+        )
+    return Content(
+        kind=kind, vertices=vertices, triangles=triangles.astype(np.int32, copy=False), warnings=warnings
+    )
+
+
+def cloud(path: Path, kind: str, points: Float, warnings: tuple[str, ...] = ()) -> Content:
+    """Return the content of a file of points (N, 3), those that are not finite dropped with a warning.
+
+    Raises:
+        WorldError: no point is finite.
+    """
+    finite = np.isfinite(points).all(axis=1)
+    if not finite.any():
+        raise WorldError(f"world file {path} holds no valid points")
+    dropped = int(np.count_nonzero(~finite))
+    if dropped:
+        points = points[finite]
+        warnings = (*warnings, f"{dropped} of {finite.size} points are NaN or infinite and were dropped")
+    return Content(kind=kind, points=points, warnings=warnings)

@@ -20,12 +20,9 @@ import numpy as np
 
 from uavexp.arrays import Float, Int32
 from uavexp.errors import WorldError
+from uavexp.formats import ros_map
+from uavexp.formats.base import FREE, SOLID, UNMEASURED, Cells, Content, Options
 from uavexp.o3d import open3d
-
-MESHES = (".ply", ".obj", ".stl", ".glb")
-CLOUDS = (".pcd", ".ply")
-VOXELS = (".npz",)
-MAPS = (".yaml", ".yml")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,25 +34,54 @@ class VoxelFile:
     resolution: float  # size of a voxel
 
 
-def check_file(path: Path) -> None:
-    """Raise `WorldError` unless `path` is a readable file with something in it."""
-    if not path.exists():
-        raise WorldError(f"world file {path} does not exist")
-    if not path.is_file():
-        raise WorldError(f"world file {path} is not a file; one of {_allowed()} is needed")
-    if not os.access(path, os.R_OK):
-        raise WorldError(f"world file {path} cannot be read (permission denied)")
-    if path.stat().st_size == 0:
-        raise WorldError(f"world file {path} is empty (0 bytes)")
-    if path.suffix.lower() not in MESHES + CLOUDS + VOXELS + MAPS:
-        raise WorldError(
-            f"world file {path} has the extension {path.suffix!r}; one of {_allowed()} is needed"
-            + (" (give the map's yaml, not its image)" if path.suffix.lower() == ".pgm" else "")
-        )
+def read(path: Path, options: Options) -> Content:
+    """Return what a file holds."""
+    suffix = path.suffix.lower()
+    if suffix == ".npz":
+        return _npz(path)
+    if suffix in (".yaml", ".yml"):
+        return _plan(path, options)
+    if suffix == ".pcd" or (suffix == ".ply" and not ply_counts(path)[1]):
+        return Content(kind=f"{suffix[1:]} cloud", points=read_cloud(path))
+    vertices, triangles = read_mesh(path)
+    return Content(kind=f"{suffix[1:]} mesh", vertices=vertices, triangles=triangles)
 
 
-def _allowed() -> str:
-    return " ".join(dict.fromkeys(MESHES + CLOUDS + VOXELS + MAPS))
+def files(path: Path) -> tuple[Path, ...]:
+    """Return the other files that a file's content depends on."""
+    return (ros_map.image_path(path),) if path.suffix.lower() in (".yaml", ".yml") else ()
+
+
+def _npz(path: Path) -> Content:
+    voxels = read_voxels(path)
+    return Content(kind="npz voxels", cells=_cells(voxels.occupied, voxels.free, voxels.resolution))
+
+
+def _cells(occupied: Float, free: Float | None, size: float) -> Cells:
+    """Cells of the centres (N, 3) of voxels; without measured free ones all others are free."""
+    known = occupied if free is None else np.concatenate([occupied, free])
+    corner = known.min(axis=0)
+    shape = np.rint((known.max(axis=0) - corner) / size).astype(np.int64) + 1
+    state = np.full(shape, FREE if free is None else UNMEASURED, dtype=np.uint8)
+    if free is not None:
+        state[tuple(np.rint((free - corner) / size).astype(np.int64).T)] = FREE
+    state[tuple(np.rint((occupied - corner) / size).astype(np.int64).T)] = SOLID
+    return Cells(state=state, origin=corner - 0.5 * size, size=np.full(3, size))
+
+
+def _plan(path: Path, options: Options) -> Content:
+    plan = ros_map.read(path)
+    state = np.where(plan.occupied, SOLID, np.where(plan.unknown, UNMEASURED, FREE)).astype(np.uint8)
+    return Content(
+        kind="ROS map",
+        cells=Cells(
+            state=state[..., None],
+            origin=np.array([*plan.origin_m, 0.0]),
+            size=np.array([plan.resolution_m, plan.resolution_m, options.wall_height_m]),
+            yaw_rad=plan.yaw_rad,
+            is_plan=True,
+        ),
+    )
 
 
 def read_mesh(path: Path) -> tuple[Float, Int32]:

@@ -38,15 +38,7 @@ def read(path: Path) -> RosMap:
     Raises:
         WorldError: either file is missing, damaged, or lacks a key.
     """
-    try:
-        entries: Any = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise WorldError(f"world file {path} is no yaml file") from error
-    if not isinstance(entries, dict):
-        raise WorldError(f"world file {path} is no ROS map: it holds no keys")
-    missing = [key for key in ("image", "resolution", "origin") if key not in entries]
-    if missing:
-        raise WorldError(f"world file {path} is no ROS map: {', '.join(missing)} missing")
+    entries = _entries(path)
     if str(entries.get("mode", "trinary")) not in ("trinary", "scale"):
         raise WorldError(f"world file {path}: mode must be trinary or scale, got {entries['mode']!r}")
     resolution = _number(path, "resolution", entries["resolution"])
@@ -69,6 +61,24 @@ def read(path: Path) -> RosMap:
         origin_m=(x, y),
         yaw_rad=yaw,
     )
+
+
+def image_path(path: Path) -> Path:
+    """Return the image that a map's yaml file names."""
+    return path.parent / str(_entries(path)["image"])
+
+
+def _entries(path: Path) -> dict[str, Any]:
+    try:
+        entries: Any = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise WorldError(f"world file {path} is no yaml file") from error
+    if not isinstance(entries, dict):
+        raise WorldError(f"world file {path} is no ROS map: it holds no keys")
+    missing = [key for key in ("image", "resolution", "origin") if key not in entries]
+    if missing:
+        raise WorldError(f"world file {path} is no ROS map: {', '.join(missing)} missing")
+    return entries
 
 
 def _number(path: Path, name: str, value: object) -> float:

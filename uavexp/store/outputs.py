@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import hashlib
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from uavexp import formats
 from uavexp.config.build import GROUPS, TARGET, top_level
 from uavexp.config.composition import Cell
-from uavexp.errors import ConfigError
+from uavexp.errors import ConfigError, WorldError
 from uavexp.flight import Trial
 from uavexp.log import Replan
 from uavexp.store.logs import arrays_digest, log_arrays, pack
@@ -133,13 +133,11 @@ def _content(group: str, key: str, value: Any) -> Any:
     """A file parameter by its contents, so that a record holds no path."""
     if key == TARGET or not isinstance(value, str) or not (key == "path" or key.endswith("_path")):
         return value
-    file = Path(value).expanduser()
     try:
-        data = file.read_bytes()
-        if file.suffix in (".yaml", ".yml"):  # a ROS map names its image
-            image = re.search(rb"^image:\s*['\"]?(.+?)['\"]?\s*$", data, re.MULTILINE)
-            data += (file.parent / image[1].decode()).read_bytes() if image else b""
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not text"
+        digest = hashlib.sha256()
+        for file in formats.files(Path(value).expanduser()):
+            digest.update(file.read_bytes())
+    except (OSError, WorldError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
         raise ConfigError(f"{group}.{key}={value} cannot be read: {reason}") from error
-    return f"sha256:{hashlib.sha256(data).hexdigest()}"
+    return f"sha256:{digest.hexdigest()}"
