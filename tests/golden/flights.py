@@ -21,7 +21,7 @@ from typing import Any
 DIGESTS = Path(__file__).with_name("digests.json")
 # libraries read these when they load
 PROCESSOR = {
-    "NPY_DISABLE_CPU_FEATURES": "AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL AVX512_SPR",
+    "NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL AVX512_SPR",
     "OPENBLAS_CORETYPE": "Haswell",
 }
 COLUMNS = {"world": "random_columns", "world.size_m": [8.0, 6.0, 2.6], "world.density_per_m2": 0.15}
