@@ -16,6 +16,7 @@ import numpy as np
 
 from uavexp.arrays import Bool, Float, Float32, Int, Int32, UInt8, check_shape
 from uavexp.field import DistanceField
+from uavexp.space import Space
 from uavexp.trajectory import Trajectory
 
 
@@ -315,3 +316,5 @@ class World:
     difficulty: Difficulty
     digest: str  # sha256 over geometry and task
     reference: ReferenceMap | None = None  # the map known before the flight, where there is one
+    space: Space = field(default_factory=Space.all_free)  # what is solid, free, or never measured
+    notes: tuple[str, ...] = ()  # what a person should know of it, a sentence each

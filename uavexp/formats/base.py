@@ -9,8 +9,9 @@ import numpy as np
 
 from uavexp.arrays import Float, Int, Int32, UInt8
 from uavexp.errors import WorldError
-
-UNMEASURED, FREE, SOLID = 0, 1, 2  # states of a cell
+from uavexp.space import FREE as FREE  # states of a cell
+from uavexp.space import SOLID as SOLID
+from uavexp.space import UNMEASURED as UNMEASURED
 
 
 def _none() -> Float:

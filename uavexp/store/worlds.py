@@ -9,15 +9,18 @@ from typing import IO, Any
 import numpy as np
 
 from uavexp.errors import RecordError
+from uavexp.space import Space
 from uavexp.store.logs import check_packed, pack, unpack
 from uavexp.types import Difficulty, ReferenceMap, World
+
+_PARTS: dict[str, type] = {"difficulty": Difficulty, "reference": ReferenceMap, "space": Space}
 
 
 def world_bytes(world: World) -> bytes:
     """A world as npz; equal worlds give equal bytes."""
     fields: dict[str, Any] = {item.name: getattr(world, item.name) for item in dataclasses.fields(World)}
-    reference = fields.pop("reference")
-    nested = {"difficulty": fields.pop("difficulty"), **({"reference": reference} if reference else {})}
+    fields["notes"] = np.array(world.notes, dtype=np.str_)
+    nested = {name: part for name in _PARTS if (part := fields.pop(name)) is not None}
     named = fields | {
         f"{part}.{item.name}": getattr(value, item.name)
         for part, value in nested.items()
@@ -44,14 +47,14 @@ def read_world(path: Path | IO[bytes]) -> World:
     arrays = unpack(path)
     values: dict[str, Any] = {name: item.item() if item.ndim == 0 else item for name, item in arrays.items()}
     try:
-        known = "reference.triangles" in values
-        return World(
-            difficulty=_part(Difficulty, "difficulty", values),
-            reference=_part(ReferenceMap, "reference", values) if known else None,
-            **values,
-        )
+        parts = {name: _part(kind, name, values) for name, kind in _PARTS.items() if _has(name, values)}
+        return World(notes=tuple(map(str, values.pop("notes", ()))), **parts, **values)
     except (KeyError, TypeError) as error:
         raise RecordError(f"{path}: no world ({error})") from error
+
+
+def _has(name: str, values: dict[str, Any]) -> bool:
+    return any(key.startswith(f"{name}.") for key in values)
 
 
 def _part(kind: type, name: str, values: dict[str, Any]) -> Any:

@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from pyarrow import parquet
 
 from tests.logs import make_log, make_replan, still_curve
+from uavexp.check.promise import same
 from uavexp.errors import RecordError
 from uavexp.log import Contact, Replan, TrialLog
 from uavexp.store.logs import arrays_digest, flat, log_arrays, nested, pack, read_log
@@ -357,7 +358,7 @@ def test_a_world_comes_back_as_it_was_and_equal_worlds_give_equal_bytes(tmp_path
     for item in dataclasses.fields(World):
         given, got = getattr(world, item.name), getattr(back, item.name)
         assert type(given) is type(got), item.name
-        assert np.array_equal(given, got) if isinstance(given, np.ndarray) else given == got
+        assert same(given, got), item.name
     assert world_bytes(back) == world_bytes(world) == (tmp_path / "world.npz").read_bytes()
     (tmp_path / "log.npz").write_bytes((tmp_path / "world.npz").read_bytes()[:300])
     with pytest.raises(RecordError, match="damaged"):
