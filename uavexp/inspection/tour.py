@@ -101,7 +101,7 @@ def _check(cost: Float) -> None:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Solve one TSPLIB file and print its tour's length; 2 when it cannot be read."""
     parser = argparse.ArgumentParser(prog="python -m uavexp.inspection.tour", description="Closed tour.")
-    parser.add_argument("file", type=Path, help="TSPLIB file, EUC_2D or GEO")
+    parser.add_argument("file", type=Path, help="TSPLIB file of type TSP")
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args(arguments)
     begin = time.perf_counter()
