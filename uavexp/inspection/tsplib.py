@@ -134,17 +134,17 @@ def _explicit(path: Path, parts: _Parts, nodes: int) -> Float:
 
 def _rounded(node: Float) -> Float:
     """Euclidean distances to the nearest whole number."""
-    return np.floor(cdist(node, node) + 0.5)
+    return np.asarray(np.floor(cdist(node, node) + 0.5))
 
 
 def _ceiling(node: Float) -> Float:
     """Euclidean distances rounded up."""
-    return np.ceil(cdist(node, node))
+    return np.asarray(np.ceil(cdist(node, node)))
 
 
 def _pseudo_euclidean(node: Float) -> Float:
     """Distances of att48 and att532: Euclidean ones over the root of ten, rounded up."""
-    return np.ceil(np.sqrt(cdist(node, node, "sqeuclidean") / 10.0))
+    return np.asarray(np.ceil(np.sqrt(cdist(node, node, "sqeuclidean") / 10.0)))
 
 
 def _geographic(node: Float) -> Float:
@@ -156,7 +156,7 @@ def _geographic(node: Float) -> Float:
     q2 = np.cos(latitude[:, None] - latitude[None])
     q3 = np.cos(latitude[:, None] + latitude[None])
     angle = np.arccos(np.clip(0.5 * ((1.0 + q1) * q2 - (1.0 - q1) * q3), -1.0, 1.0))
-    apart = np.trunc(_EARTH_KM * angle + 1.0)
+    apart: Float = np.trunc(_EARTH_KM * angle + 1.0)
     np.fill_diagonal(apart, 0.0)
     return apart
 
