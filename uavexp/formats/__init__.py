@@ -19,9 +19,9 @@ __all__ = ["FREE", "READERS", "SOLID", "UNMEASURED", "Cells", "Content", "Option
 # suffix to its module here, which has `read(path, options)`, and `files(path)` where a file names others;
 # a module is imported when a file needs it, and imports at its top the library that it needs
 READERS = {
-    ".ply": "older",
-    ".obj": "older",
-    ".stl": "older",
+    ".ply": "ply",
+    ".obj": "obj",
+    ".stl": "stl",
     ".glb": "older",
     ".pcd": "older",
     ".npz": "older",
@@ -35,7 +35,10 @@ PACKAGES = {"collada": "pycollada", "ezdxf": "ezdxf", "laspy": "laspy", "shapely
 def read(path: Path, options: Options) -> Content:
     """Return what a file holds; raise `WorldError` in one line when it cannot be read whole."""
     _check_file(path)
-    content: Content = _module(path).read(path, options)
+    try:
+        content: Content = _module(path).read(path, options)
+    except MemoryError as error:
+        raise WorldError(f"world file {path} holds more than the memory does; give a part of it") from error
     return content
 
 
