@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from uavexp.motion.base import Craft, Ending, Judge, Motion
 from uavexp.motion.compiled import compiled_motion
 from uavexp.motion.stepwise import Stepwise
 from uavexp.movers.base import Movers
-from uavexp.parameters import NonNegative, Positive, Whole, option
+from uavexp.parameters import NonNegative, Positive, Whole, between, option
 from uavexp.pilot.base import Crew, Pilot
 from uavexp.planner.base import Planner
 from uavexp.recorder import Recorder, Stopwatch, seen_share
@@ -32,7 +33,7 @@ from uavexp.scene import Scene
 from uavexp.seeding import Stream, generator, only_seeded_draws
 from uavexp.sensor.base import Sensor
 from uavexp.trigger.base import TriggerPolicy
-from uavexp.types import MapUpdate, Observation, Outcome, Reference, State, Tracks, World
+from uavexp.types import Limits, MapUpdate, Observation, Outcome, Reference, State, Tracks, World
 from uavexp.vehicle.base import Vehicle
 from uavexp.vehicle.contact import ContactTracker
 from uavexp.world.base import WorldGenerator
@@ -63,6 +64,7 @@ class Parts:
     world_seed: Whole | None = None  # of the layout alone; None: the trial's seed
     step_s: Positive = 0.01
     latency_s: NonNegative = 0.03
+    speed_margin: Annotated[float, between(0, 0.5)] = 0.04
     start_bubble_m: NonNegative = 0.6
     stuck_s: Positive = 20.0
 
@@ -248,17 +250,23 @@ def _hover(world: World) -> State:
     )
 
 
+def _slower(limits: Limits, margin: float) -> Limits:
+    """The limits, with a share of the speed left over."""
+    return replace(limits, max_speed_mps=(1.0 - margin) * limits.max_speed_mps)
+
+
 def _begin(parts: Parts, world: World, seed: int) -> _Flight:
     """Give every part its trial's context and its own random stream."""
     scene, limits, watch = Scene(world), parts.vehicle.limits, Stopwatch()
+    planned, steered = (_slower(limits, share * parts.speed_margin) for share in (1.0, 0.5))
     parts.movers.reset(world, scene, limits, generator(seed, Stream.MOVERS))
     parts.detection.reset(limits, generator(seed, Stream.DETECTION))
     parts.sensor.reset(scene, generator(seed, Stream.SENSOR))
     parts.mapping.reset(world.bounds_m, scene)
     parts.mapping.mark_free(world.start_m, parts.start_bubble_m)
     parts.trigger.reset(limits)
-    parts.planner.reset(limits, generator(seed, Stream.PLANNER))
-    parts.controller.reset(limits, parts.vehicle.mass_kg)
+    parts.planner.reset(planned, generator(seed, Stream.PLANNER))
+    parts.controller.reset(steered, parts.vehicle.mass_kg)
     parts.vehicle.reset(_hover(world))
     with watch.lap("mission"):
         parts.mission.reset(world, scene, limits)
@@ -268,8 +276,8 @@ def _begin(parts: Parts, world: World, seed: int) -> _Flight:
         explorer=guide,
         trigger=parts.trigger,
         planner=parts.planner,
-        must_brake=parts.safety.begin(limits),
-        limits=limits,
+        must_brake=parts.safety.begin(planned),
+        limits=planned,
         latency_s=parts.latency_s,
         start_m=world.start_m.copy(),
         start_yaw_rad=world.start_yaw_rad,

@@ -53,6 +53,8 @@ FLIGHTS: dict[str, dict[str, Any]] = {
 
 def fly() -> dict[str, dict[str, Any]]:
     """Fly every one of `FLIGHTS`; the digest of each log, and what tells a person what moved."""
+    import numpy as np
+
     import uavexp
     from uavexp.store.logs import arrays_digest, log_arrays
 
@@ -66,6 +68,7 @@ def fly() -> dict[str, dict[str, Any]]:
             "end_s": round(float(trial.log.steps.time_s[-1]), 6),
             "plans": len(trial.log.replans),
             "path_m": round(float(trial.metrics["path_length_m"]), 6),
+            "top_mps": round(float(np.linalg.norm(trial.log.steps.velocity_mps, axis=1).max()), 6),
         }
         print(f"{name:<16} {time.perf_counter() - begin_s:4.1f} s  {found[name]}", file=sys.stderr)
     return found

@@ -11,6 +11,7 @@ from uavexp.check.hall import LIMITS, hovering
 from uavexp.check.promise import Make, keep, same, untouched
 from uavexp.geometry import GRAVITY_MPS2, rotation_from_quaternion, wrap_angle, yaw_of
 from uavexp.types import Command, Reference
+from uavexp.vehicle.quadrotor import Quadrotor
 
 _STATE = hovering((0.0, 0.0, 0.0))
 _REFERENCE = Reference(
@@ -19,6 +20,10 @@ _REFERENCE = Reference(
 _MASS_KG = 1.3
 _ANGLE_RAD = 1e-3
 _FAR_M = 1e6
+_STEP_S, _STEPS = 0.01, 400
+_LEADS_M = (0.0, 0.3, 5.0)  # of a reference before the vehicle, when both set off
+_PACE = 0.96  # of the speed limit: of the reference
+_SPARE = 1.001  # of the speed limit
 
 
 def _command(make: Make, **wanted: Any) -> Command:
@@ -74,6 +79,35 @@ def stays_upright_however_far_it_is(make: Make) -> None:
         norm = float(np.linalg.norm(command.quaternion_wxyz))
         keep(abs(norm - 1.0) < 1e-6, f"a quaternion of length {norm:.6f} {at}")
         keep(_body_z(command)[2] > 0.5, f"body z points {_body_z(command)[2]:.3f} upwards {at}")
+
+
+def keeps_the_vehicle_below_its_speed_limit(make: Make) -> None:
+    """However far behind: the shipped quadrotor after a reference that is gone at once at a planned speed."""
+    for way in ((1.0, 0.0, 0.0), (0.6, -0.6, 0.5), (0.0, 0.0, -1.0)):
+        for lead_m in _LEADS_M:
+            fastest_mps, most_mps = _fastest_mps(make(), np.array(way) / np.linalg.norm(way), lead_m)
+            keep(
+                fastest_mps <= _SPARE * most_mps,
+                f"{lead_m:g} m behind its reference along {way} it flies {fastest_mps:.3f} m/s,"
+                f" the limit is {most_mps:g} m/s",
+            )
+
+
+def _fastest_mps(controller: Any, along: Any, lead_m: float) -> tuple[float, float]:
+    """Highest speed flown in pursuit of a reference along a direction (3,), and the limit."""
+    vehicle, state, fastest_mps = Quadrotor(), _STATE, 0.0
+    vehicle.reset(state)
+    controller.reset(vehicle.limits, vehicle.mass_kg)
+    velocity_mps = _PACE * vehicle.limits.max_speed_mps * along
+    every = max(round(1.0 / (controller.rate_hz * _STEP_S)), 1)
+    for step in range(_STEPS):
+        position_m = lead_m * along + step * _STEP_S * velocity_mps
+        if step % every == 0:
+            wanted = replace(_REFERENCE, position_m=position_m, velocity_mps=velocity_mps)
+            command = controller.command(state, wanted)
+        state = vehicle.step(command, _STEP_S)
+        fastest_mps = max(fastest_mps, float(np.linalg.norm(state.velocity_mps)))
+    return fastest_mps, vehicle.limits.max_speed_mps
 
 
 def forgets_the_last_trial_at_a_reset(make: Make) -> None:

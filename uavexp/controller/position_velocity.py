@@ -1,11 +1,14 @@
 """Cascaded position-velocity loop with acceleration feed-forward, to thrust and attitude.
 
-    v* = v_ref + clip(k_p (p_ref - p))        a* = a_ref + k_v (v* - v) + (c / m) |v| v
-    f  = a* + g e3, tilted at most `max_tilt_rad`      thrust = m f . z_body
+    v* = v_ref + clip(k_p (p_ref - p))
+    a* = clip(a_ref + k_v (v* - v)), of it along v at most k_s (v_max - |v|)
+    f  = a* + (c / m) |v| v + g e3, tilted at most `max_tilt_rad`        thrust = m f . z_body
 
 Body z of the wanted attitude points along f, its heading is the reference's yaw; the yaw
-rate of the reference is fed forward. Paper 1 names a position-velocity loop and no more;
-gains and bounds are [ours].
+rate of the reference is fed forward. The bound along v is a barrier (Ames et al. 2017): however far
+behind the vehicle is, its speed comes no faster to its limit than exponentially, and returns from
+beyond it. Clipping v* would not do, since a_ref drives on. Paper 1 names a position-velocity loop
+and no more; gains and bounds are [ours].
 """
 
 from __future__ import annotations
@@ -33,6 +36,9 @@ class Gains(NamedTuple):
     max_correction_mps: float
     max_tilt_rad: float
     drag_per_m: float
+    max_speed_mps: float
+    speed_gain_per_s: float
+    max_acceleration_mps2: float
 
 
 @nb.njit(cache=True)
@@ -58,6 +64,15 @@ def _clip_norm(vector: Float, limit: float) -> None:
 
 
 @nb.njit(cache=True)
+def _clip_along(acceleration: Float, velocity: Float, speed: float, limit: float) -> None:
+    """Shorten an acceleration (3,) in place until it is at most `limit` along the velocity (3,)."""
+    along = acceleration[0] * velocity[0] + acceleration[1] * velocity[1] + acceleration[2] * velocity[2]
+    excess = along - limit * speed
+    if excess > 0.0:
+        acceleration -= excess / (speed * speed) * velocity
+
+
+@nb.njit(cache=True)
 def thrust_and_attitude(
     position_m: Float,
     velocity_mps: Float,
@@ -73,7 +88,10 @@ def thrust_and_attitude(
     _clip_norm(correction, gains.max_correction_mps)
     wanted_mps = reference_velocity_mps + correction
     force = reference_acceleration_mps2 + gains.velocity_per_s * (wanted_mps - velocity_mps)
+    _clip_norm(force, gains.max_acceleration_mps2)
     speed = math.sqrt(velocity_mps[0] ** 2 + velocity_mps[1] ** 2 + velocity_mps[2] ** 2)
+    if speed > 0.0:
+        _clip_along(force, velocity_mps, speed, gains.speed_gain_per_s * (gains.max_speed_mps - speed))
     force += gains.drag_per_m * speed * velocity_mps
     force[2] = max(force[2] + GRAVITY_MPS2, _LEAST_LIFT * GRAVITY_MPS2)
     sideways = math.sqrt(force[0] * force[0] + force[1] * force[1])
@@ -95,15 +113,20 @@ class PositionVelocity:
     position_gain_per_s: Positive = 2.0  # 1/s, from position error to a correction of velocity [ours]
     velocity_gain_per_s: Positive = 5.0  # 1/s, from velocity error to acceleration [ours]
     max_correction_mps: Positive = 1.0  # m/s, largest correction of velocity for a position error [ours]
+    speed_gain_per_s: Positive = 3.0  # 1/s, from what is left to the vehicle's speed limit to the largest
+    # acceleration along the motion; the attitude lags by 0.2 s [ours]
+    acceleration_share: Positive = 2.0  # of the vehicle's acceleration limit: largest acceleration asked for;
+    # plans use up to one [ours]
     max_tilt_rad: Annotated[float, above(0), at_most(1.2)] = 0.6  # rad, largest tilt asked for;
     # 2.5 m/s^2 needs 0.25 [ours]
     drag_kgpm: NonNegative = 0.0  # kg/m, c in the drag force c v^2 to make up for;
     # the quadrotor's 0.0026 moves it by 2 mm [ours]
+    _limits: Limits = field(init=False, repr=False)
     _mass_kg: float = field(init=False, repr=False)
 
     def reset(self, limits: Limits, mass_kg: float) -> None:
-        """Begin a trial of a vehicle of this mass."""
-        self._mass_kg = mass_kg
+        """Begin a trial of a vehicle with these limits, of this mass."""
+        self._limits, self._mass_kg = limits, mass_kg
 
     @property
     def gains(self) -> Gains:
@@ -114,6 +137,9 @@ class PositionVelocity:
             max_correction_mps=self.max_correction_mps,
             max_tilt_rad=self.max_tilt_rad,
             drag_per_m=self.drag_kgpm / self._mass_kg,
+            max_speed_mps=self._limits.max_speed_mps,
+            speed_gain_per_s=self.speed_gain_per_s,
+            max_acceleration_mps2=self.acceleration_share * self._limits.max_acceleration_mps2,
         )
 
     def command(self, estimated_state: State, reference: Reference) -> Command:

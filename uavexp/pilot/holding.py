@@ -4,7 +4,8 @@ A request made at t is planned from the predicted reference at t + latency on th
 and takes effect at t + latency; until then the vehicle follows the old trajectory. One
 request is in flight at a time, further triggers meanwhile are dropped and counted. When
 no plan is found: the goal is set aside, the next goals are tried, then the vehicle brakes
-within its stopping distance, holds, and tries again at the explorer's rate.
+within its stopping distance, holds, and tries again at the explorer's rate. A vehicle that
+has fallen behind its reference, whatever held it, stops where it is, and a plan is asked for.
 """
 
 from __future__ import annotations
@@ -36,8 +37,8 @@ class Holding:
 
     settle_s: NonNegative = 0.5  # s, hovering and mapping before the first plan, or it is made
     # on a single scan [ours]
-    restart_error_m: NonNegative = 0.4  # m, tracking error from which a plan starts at the measured state
-    # instead of the reference; 0: always [ours]
+    restart_error_m: NonNegative = 0.4  # m, tracking error at which the vehicle has fallen behind: it stops,
+    # and a plan starts at the measured state instead of the reference; 0: every plan does [ours]
     goals_per_request: Count = 3  # so many goals are tried before the vehicle brakes [ours]
     look_around_radps: NonNegative = 0.8  # rad/s, turning on the spot while there is no plan:
     # only new sights can help [ours]
@@ -117,13 +118,16 @@ class HoldingPilot:
 
     def decide(self, observation: Observation) -> float:
         """Ask safety and trigger; return the trigger's score."""
+        behind = self._stops_behind(observation)
         if not self.failure and self.crew.must_brake(observation):
             self._brake(observation.time_s, "braked before an obstacle or unknown space")
             self._wait_for_rest = True
         with self.crew.watch.lap("trigger"):
             decision = self.crew.trigger.decide(observation)
         # After a failure the pilot tries again by itself, equally often under every policy.
-        if decision.replan and self.trajectory is not None and not self.failure:
+        if behind:
+            self.request(Decision(replan=True, cause=causes.BEHIND.name), observation)
+        elif decision.replan and self.trajectory is not None and not self.failure:
             self.request(decision, observation)
         return decision.score
 
@@ -167,8 +171,7 @@ class HoldingPilot:
         start_s = observation.time_s + self.crew.latency_s
         state = observation.state
         position_m, velocity_mps, acceleration_mps2 = self._planned_state(start_s)
-        error_m = float(np.linalg.norm(observation.reference.position_m - state.position_m))
-        far = error_m >= self.rules.restart_error_m
+        far = _error_m(observation) >= self.rules.restart_error_m
         if far or observation.field.distance_m(position_m[None])[0] <= 0.0:
             position_m = state.position_m + self.crew.latency_s * state.velocity_mps
             velocity_mps, acceleration_mps2 = state.velocity_mps, np.zeros(3)
@@ -232,6 +235,19 @@ class HoldingPilot:
             self.trajectory = braking_trajectory(time_s, *self._planned_state(time_s), self.crew.limits)
             self.goal = None
 
+    def _stops_behind(self, observation: Observation) -> bool:
+        """Whether the vehicle has fallen behind its reference; from now on it stops where it is."""
+        error_m, most_m = _error_m(observation), self.rules.restart_error_m
+        if self.trajectory is None or not 0.0 < most_m <= error_m:
+            return False
+        self._pending, self.goal = None, None
+        self.failure = f"the vehicle was {error_m:.2f} m from its reference"
+        state = observation.state
+        self.trajectory = braking_trajectory(
+            observation.time_s, state.position_m, state.velocity_mps, np.zeros(3), self.crew.limits
+        )
+        return True
+
     def _look_around(self, step_s: float) -> Reference:
         """Hold and turn: without a plan, only new sights can help."""
         rate_radps = self.heading.turn(self.rules.look_around_radps, step_s)
@@ -246,3 +262,8 @@ class HoldingPilot:
             yaw_rad=self.heading.yaw_rad,
             yaw_rate_radps=yaw_rate_radps,
         )
+
+
+def _error_m(observation: Observation) -> float:
+    """Tracking error."""
+    return float(np.linalg.norm(observation.reference.position_m - observation.state.position_m))

@@ -173,7 +173,7 @@ def test_derivatives_of_a_trajectory_agree_with_its_evaluation() -> None:
 
 def tracking_error_m(controller: Controller, asked: Callable[[float], Reference], seconds: float) -> float:
     """RMS distance from the reference of the quadrotor that starts on it."""
-    vehicle = Quadrotor(max_speed_mps=5.0, max_acceleration_mps2=3.5)
+    vehicle = Quadrotor(max_speed_mps=6.0, max_acceleration_mps2=3.5)
     controller.reset(vehicle.limits, vehicle.mass_kg)
     first = asked(0.0)
     one = (first.velocity_mps, first.acceleration_mps2, first.jerk_mps3, np.zeros(3))

@@ -200,3 +200,27 @@ def test_a_hover_before_a_flight_shifts_it_and_nothing_else() -> None:
     np.testing.assert_allclose(evaluate(later, np.array([flown.start_s + 0.3]))[0][0], START)
     assert later.start_s == flown.start_s
     assert hover_before(flown, 0.0) is flown
+
+
+@pytest.mark.parametrize("trigger", [Ssp(), Mcr(), Tbr(interval_s=100.0)], ids=["ssp", "mcr", "tbr"])
+def test_a_vehicle_left_behind_stops_its_reference_and_plans_from_where_it_is(
+    trigger: Ssp | Mcr | Tbr,
+) -> None:
+    """Whatever holds it, and whatever the policy."""
+    pilot, field, held_m = make(trigger), room(), START + np.array([0.5, 0.1, 0.0])
+    fly(pilot, {0.0: field}, 0.1)
+    for step in range(10, 400):
+        reference = pilot.reference(step * 0.01, 0.01)
+        away_m = float(np.linalg.norm(reference.position_m - held_m))
+        seen = replace(see(field, step * 0.01, reference), trajectory=pilot.trajectory)
+        seen = replace(seen, state=replace(seen.state, position_m=held_m, velocity_mps=np.zeros(3)))
+        if step % 10 == 0:
+            pilot.decide(seen)
+        if pilot.replans[-1].cause == "behind":
+            break
+    assert 0.4 <= away_m < 0.4 + 2.5 * 0.1
+    assert pilot.replans[-1].status is PlanStatus.OK
+    next_m = [pilot.reference((step + 1 + k) * 0.01, 0.01).position_m for k in range(5)]
+    assert np.linalg.norm(np.array(next_m) - held_m, axis=1).max() < 0.01
+    assert pilot.trajectory is not None
+    np.testing.assert_allclose(evaluate(pilot.trajectory, np.array([0.0]))[0][0], held_m, atol=1e-9)
