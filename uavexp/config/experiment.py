@@ -14,10 +14,11 @@
 
 An entry's values are what would be typed after `=`: text is read by the same parser, so
 `"1,2,5"` are three values and each makes a cell of its own, told apart by the axis
-`setting`. An axis given as the name of another experiment, `scene: mcr/table1`, has the
-entries of that experiment's axis; so have tables, figures and claims. On the command line an
-axis picks entries (`arm=MCR,SSP`), a key that entries set replaces their values there and
-nowhere else, and any other key holds for every cell.
+`setting`. In place of an entry, `world.number: "range(0,300)"` are 300 of them, one for each
+value of that key and named by it. An axis given as the name of another experiment,
+`scene: mcr/table1`, has the entries of that experiment's axis; so have tables, figures and
+claims. On the command line an axis picks entries (`arm=MCR,SSP`), a key that entries set
+replaces their values there and nowhere else, and any other key holds for every cell.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -241,7 +242,14 @@ def _pick(
 def _entries(name: str, axis: str, entries: Mapping[str, Any]) -> dict[str, tuple[Setting, ...]]:
     if not entries or axis == SETTING_AXIS:
         raise ConfigError(f"experiments={name}: axis {axis} needs entries, and another name than setting")
-    return {str(entry): _settings(name, f"axes.{axis}.{entry}", tree) for entry, tree in entries.items()}
+    found: dict[str, tuple[Setting, ...]] = {}
+    for entry, tree in entries.items():
+        swept = parse_settings([f"{entry}={tree}"]) if isinstance(tree, str) else []
+        if len(swept) == 1 and len(swept[0].values) > 1:
+            found |= {render(value): (replace(swept[0], values=(value,)),) for value in swept[0].values}
+        else:
+            found[str(entry)] = _settings(name, f"axes.{axis}.{entry}", tree)
+    return found
 
 
 def _settings(name: str, place: str, tree: Any) -> tuple[Setting, ...]:

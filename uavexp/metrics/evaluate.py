@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from uavexp.log import TrialLog
 from uavexp.metrics import (
+    barn,
     clearance,
     coverage,
     ending,
@@ -27,6 +28,7 @@ METRICS: Metrics = {
     **plan.METRICS,
     **tracking_movers.METRICS,
     **coverage.METRICS,
+    **barn.METRICS,
 }
 _BY_COLUMN = {metric.column: metric for metric in METRICS}
 

@@ -77,6 +77,22 @@ def test_an_axis_picks_entries_in_the_files_order(composer: Composer) -> None:
     ]
 
 
+def test_a_swept_key_is_an_entry_for_each_value(tmp_path: Path) -> None:
+    folder = tmp_path / "experiments" / "own"
+    folder.mkdir(parents=True)
+    scene = "{rooms: {world: rooms}, world.size_m: '[30.0,12.0,3.0],[20.0,12.0,3.0]', step_s: 'range(1,3)'}"
+    (folder / "two.yaml").write_text(f"axes: {{arm: {{a: {{strategy: tbr}}}}, scene: {scene}}}")
+    labelled, axes = expand(read_experiment("own/two", folder / "two.yaml"), [])
+    assert axes["scene"] == ["rooms", "[30.0,12.0,3.0]", "[20.0,12.0,3.0]", "1", "2"]
+    assert [cell.settings[-1].values for cell in labelled[1:]] == [
+        ([30.0, 12.0, 3.0],),
+        ([20.0, 12.0, 3.0],),
+        (1,),
+        (2,),
+    ]
+    assert all(set(cell.labels) == {"arm", "scene"} for cell in labelled)
+
+
 def test_seeds_typed_win(composer: Composer) -> None:
     assert composer.command(parse_settings(["experiments=own/two", "seed=7"])).seeds == (7,)
 

@@ -313,6 +313,20 @@ def test_front_by_hand() -> None:
     assert on_front(points).tolist() == [True, True, True, False, True, False]
 
 
+def test_systems_that_were_not_flown_stand_below_with_what_is_printed_of_them(trials: pd.DataFrame) -> None:
+    flown = trials[trials["arm"] != "TBR"]
+    metrics = ["success", "replans", "detour"]
+    for front in (False, True):
+        asked = {"tables": [{"by_arm": {"metrics": metrics, "printed": True, "front": front}}]}
+        (table,) = report_of(flown, asked, name="mcr/table1").tables
+        last = table.rows[-1]
+        assert [row[0] for row in table.rows] == ["SSP", "TBR frequent", "MCR", "TBR"]
+        assert last[2:4] == ("85.0", "14.6")
+        assert column(table, "TBR", "n") == ""
+    (plain,) = report_of(flown, {"tables": [{"by_arm": {"metrics": metrics}}]}, name="mcr/table1").tables
+    assert len(plain.rows) == 3
+
+
 BEATS = "MCR beats {}: as much success and clearance with fewer replans"
 
 

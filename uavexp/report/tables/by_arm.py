@@ -12,6 +12,7 @@ from uavexp.metrics.metric import Metric
 from uavexp.report import number_format
 from uavexp.report.comparison import Panel, estimate
 from uavexp.report.labels import CLEARANCE, RATE, REPLANS
+from uavexp.report.printed import Printed
 from uavexp.report.results import FAILED, INTERVALS, Results
 from uavexp.report.tables.base import Table
 
@@ -30,8 +31,19 @@ def table(
     title: str = "",
     notes: Sequence[str] = (),
     front: bool = False,
+    printed: bool = False,
 ) -> Table:
-    """How each arm did, with `front` also whether it is on the front of success, clearance and replans."""
+    """How each arm did.
+
+    Args:
+        results: of the study.
+        name: of the table's files.
+        metrics: its columns.
+        title: above it; none: the study's.
+        notes: sentences below it.
+        front: with a column that says who is on the front of success, clearance and replans.
+        printed: with a row for each arm that is in `reference.csv` alone: a system that was not flown here.
+    """
     panel = results.panel
     shown = results.occurring(metrics)
     rows = [
@@ -53,7 +65,28 @@ def table(
         notes=(*results.notes, *notes, INTERVALS, FAILED),
         means=tuple(metrics),
     )
-    return _with_front(made, panel) if front else made
+    made = _with_front(made, panel) if front else made
+    return _with_printed(made, results, shown) if printed else made
+
+
+def _with_printed(made: Table, results: Results, shown: Sequence[Metric]) -> Table:
+    """The table with what is printed of others, and where."""
+    others = list(dict.fromkeys(arm for _, arm in results.printed if arm not in results.panel.arms))
+    blank = ("",) * (len(made.columns) - 2 - len(shown))
+    rows = [
+        (arm, "", *(_printed(results.printed.get((metric.column, arm)), metric) for metric in shown), *blank)
+        for arm in others
+    ]
+    told = [
+        f"{arm}: {found.source}. {found.notes}"
+        for (_, arm), found in results.printed.items()
+        if arm in others and found.notes
+    ]
+    return replace(made, rows=(*made.rows, *rows), notes=(*made.notes, *told))
+
+
+def _printed(found: Printed | None, metric: Metric) -> str:
+    return number_format.NONE if found is None else number_format.number(found.mean, metric.digits)
 
 
 def _with_front(made: Table, panel: Panel) -> Table:
