@@ -22,6 +22,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from uavexp.errors import ConfigError, require
 
+GREATEST_INT = 2**63 - 1  # that a column of a table holds
 MISSING = "???"  # OmegaConf's mark of a value that must be given
 
 
@@ -196,7 +197,10 @@ def _convert(name: str, value: Any, annotation: Any) -> Any:
         pairs = ((_convert(name, key, kind), item) for key, item in value.items())
         return {key: _convert(f"{name}.{key}", item, item_kind) for key, item in pairs}
     if isinstance(annotation, type):
-        return _convert_scalar(value, annotation)
+        converted = _convert_scalar(value, annotation)
+        if annotation is int:
+            require(abs(converted) <= GREATEST_INT, f"{name} must be at most {GREATEST_INT}, got {value!r}")
+        return converted
     return value
 
 

@@ -42,7 +42,7 @@ class Terminal:
 
     def __init__(self, console: Console | None = None) -> None:
         # folders and commands must survive a pipe unbroken
-        self._console = console or Console(highlight=False, soft_wrap=True)
+        self._console = console or Console(highlight=False, markup=False, soft_wrap=True)
         self._bar: Progress | None = None
         self._lock = threading.Lock()  # flights report from several threads
         self._total = self._done = self._successes = 0
@@ -51,7 +51,7 @@ class Terminal:
     def say(self, line: str) -> None:
         """Print one line as it is."""
         self._last_s = time.monotonic()
-        self._console.print(line, markup=False)
+        self._console.print(line)
 
     def listing(self, agenda: Agenda, folder: Path) -> None:
         """Print what would be flown."""
@@ -69,12 +69,12 @@ class Terminal:
             yield
             return
         columns = (
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),
             BarColumn(),
             MofNCompleteColumn(),
             TimeElapsedColumn(),
             TimeRemainingColumn(),
-            TextColumn("{task.fields[words]}"),
+            TextColumn("{task.fields[words]}", markup=False),
         )
         with Progress(*columns, console=self._console, transient=True) as self._bar:
             self._bar.add_task("trials", total=self._total, words="")
@@ -133,7 +133,7 @@ class Terminal:
         rows = [row for row in rows if row["trial"] in jobs]
         few = len(rows) <= _MAX_ROWS
         # as wide as it needs: a cut-off number is worse than a wrapped line
-        wide = Console(file=self._console.file, width=_TABLE_WIDTH)
+        wide = Console(file=self._console.file, markup=False, width=_TABLE_WIDTH)
         wide.print((trial_table if few else cell_table)(rows, list(agenda.study.axes)))
         for row in rows if few else [row for row in rows if row["status"] != "ok"][:_MAX_FAILURES]:
             if row["reason"]:

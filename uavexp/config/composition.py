@@ -21,7 +21,7 @@ from uavexp.config.options import EXPERIMENT_GROUP, PRESET_GROUP, RUNNER_GROUP, 
 from uavexp.config.overrides import Setting, expand_grid, expand_seeds, render
 from uavexp.config.own_metrics import modules_of
 from uavexp.config.trees import CONFIG_NAME, TRIGGER_GROUP, Trees
-from uavexp.config.trust import check_trust
+from uavexp.config.trust import check_places, check_trust
 from uavexp.errors import ConfigError
 from uavexp.parameters import nearest
 from uavexp.paths import conf_folder
@@ -178,6 +178,7 @@ class Composer:
         """Compose one cell into a plain, resolved, trusted tree, `hydra` included."""
         chosen, values = self._split(settings)
         tree = copy.deepcopy(self._trees.of(chosen))
+        check_places(tree)
         for setting in values:
             self._apply(tree, setting)
         tree = resolved(tree)

@@ -144,7 +144,22 @@ def _load(name: str, file: Path) -> dict[Any, Any]:
         tree = OmegaConf.to_container(loaded, resolve=False)
     except (OSError, ValueError, yaml.YAMLError, OmegaConfBaseException) as error:
         raise ConfigError(f"experiments={name} cannot be read: {one_line(error)}") from error
+    _check_plain(name, "", tree)
     return tree if isinstance(tree, dict) else {}
+
+
+def _check_plain(name: str, place: str, node: Any) -> None:
+    """Refuse what yaml reads as something else than text, numbers, lists and mappings: a date, say."""
+    if isinstance(node, Mapping):
+        for key, value in node.items():
+            _check_plain(name, f"{place}.{key}" if place else str(key), value)
+    elif isinstance(node, list):
+        for index, value in enumerate(node):
+            _check_plain(name, f"{place}[{index}]", value)
+    elif not isinstance(node, str | bool | int | float | None):
+        raise ConfigError(
+            f"experiments={name}: {place} is a {type(node).__name__}, {node}: write it as text, in quotes"
+        )
 
 
 def _other(name: str, file: Path) -> Experiment:

@@ -15,12 +15,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from uavexp.errors import ConfigError
+from uavexp.parameters import GREATEST_INT
 
 if TYPE_CHECKING:
     from hydra.core.override_parser.types import Override
 
 PAPER_SEEDS = range(20)  # "20 independent trials" (paper 1, §4.1)
 MAX_CELLS = 100_000
+_LONGEST = 200  # characters of a setting that an error repeats
 _PLAIN = re.compile(r"[A-Za-z0-9_./+-][A-Za-z0-9_./+@-]*")
 _LOOKS_TYPED = re.compile(r"(?i)(null|true|false|nan|[+-]?inf|[+-]?[\d._]+(e[+-]?\d+)?)")
 _RANGE = re.compile(r"(-?\d+):(-?\d+)(?::(-?\d+))?")
@@ -69,7 +71,7 @@ def _parse(parser: Any, text: str) -> list[Setting]:
 
     try:
         override: Override = parser.parse_override(text)
-    except HydraException as error:
+    except (HydraException, ValueError) as error:  # a number of thousands of digits is the latter
         raise ConfigError(_unparsable(text)) from error
     key = override.key_or_group
     if not key:
@@ -116,6 +118,8 @@ def _unparsable(text: str) -> str:
     key, equals, value = text.partition("=")
     if not equals or not key or not re.fullmatch(r"\+{0,2}[\w./@]+", key):
         return f"cannot read {text!r}: type KEY=VALUE, e.g. strategy=mcr (see --help)"
+    if len(text) > _LONGEST:
+        return f"cannot read {text[:_LONGEST]!r}...: {len(value)} characters"
     return f"cannot read {text!r}: quote the value, {shlex.quote(f'{key}={quoted(value)}')}"
 
 
@@ -168,6 +172,8 @@ def expand_seeds(values: Iterable[Any]) -> tuple[int, ...]:
     seeds = [seed for value in values for seed in _seeds_of(value)]
     if not seeds:
         raise ConfigError("seed: no seed given; type seed=0, seed=1,4,7 or seed=0:20")
+    if any(seed > GREATEST_INT for seed in seeds):
+        raise ConfigError(f"seed must be at most {GREATEST_INT}, got {max(seeds)}")
     negative = next((seed for seed in seeds if seed < 0), None)
     if negative is not None:
         raise ConfigError(f"seed must be >= 0, got {negative}")
@@ -185,6 +191,8 @@ def _seeds_of(value: Any) -> Sequence[int]:
     if isinstance(value, list | tuple | range):
         return [seed for item in value for seed in _seeds_of(item)]
     text = str(value).strip()
+    if re.search(r"\d{20}", text):  # nor is it read: Python refuses numbers of thousands of digits
+        raise ConfigError(f"seed must be at most {GREATEST_INT}, got {text[:60]}")
     if text == "range":
         return PAPER_SEEDS
     if match := _RANGE.fullmatch(text):

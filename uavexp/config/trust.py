@@ -13,6 +13,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from uavexp.config.options import RUNNER_GROUP
 from uavexp.errors import ConfigError
 
 VARIABLE = "UAVEXP_TRUST"
@@ -29,6 +30,27 @@ def trusted_packages() -> tuple[str, ...]:
 def is_trusted(dotted_name: str) -> bool:
     """Whether a dotted name lies inside a trusted package."""
     return any(dotted_name.startswith(f"{package}.") for package in trusted_packages())
+
+
+def check_places(tree: Mapping[str, Any]) -> None:
+    """Refuse options whose files say where results go or whom to connect to: that counts only as typed.
+
+    Dask's client unpickles what a scheduler sends, so an address from a stranger would run code.
+
+    Args:
+        tree: of options as composed, before what was typed is applied.
+
+    Raises:
+        ConfigError: names the key and what to type.
+    """
+    for key in ("out", *(f"{RUNNER_GROUP}.{name}" for name in ("address", "queue"))):
+        group, _, name = key.rpartition(".")
+        value = (tree.get(group, {}) if group else tree).get(name)
+        if value is not None:
+            raise ConfigError(
+                f"a configuration file sets {key}={value!r}: refused, where results go and whom to connect "
+                f"to count only as typed; type {key}=... yourself if you trust it"
+            )
 
 
 def check_trust(tree: Any) -> None:

@@ -45,7 +45,7 @@ def section(results: Results) -> str:
             "<code>python -m uavexp.report</code> with this folder again.</p>"
         )
     data = json.dumps(payload(results, shared), sort_keys=True, separators=(",", ":"), allow_nan=False)
-    data = data.replace("</", "<\\/")  # nothing in it may end the script element
+    data = data.replace("<", "\\u003c")  # nothing in it may end the script element or begin a comment
     buttons = "\n".join(f'<button data-arm="{escape(arm)}">{escape(arm)}</button>' for arm in shared.logs)
     asset = Path(__file__).with_name("assets") / "flight3d.js"
     return f"""<p>{escape(_caption(shared))}</p>

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Sequence
 
 from uavexp.report.tables.base import Table
@@ -44,6 +45,7 @@ _LATEX = {
     "√": r"$\surd$",
     "…": r"\ldots{}",
 }
+_NUMBERS = re.compile(r"[+-][\d\s.,;%±()\[\]−–-]*(e[+-]?\d+)?")  # -0.3 [-0.5, -0.1]
 _WIDE = 90  # characters of the longest row above which the table is scaled to the text's width
 
 
@@ -51,9 +53,14 @@ def to_csv(table: Table) -> str:
     """Comma-separated values, the column names in the first line; title and notes are left out."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(table.columns)
-    writer.writerows(table.rows)
+    writer.writerows([_no_formula(cell) for cell in row] for row in _all_rows(table))
     return text.getvalue()
+
+
+def _no_formula(cell: str) -> str:
+    """The cell, quoted with an apostrophe where a spreadsheet would calculate it."""
+    is_formula = cell.startswith(("=", "+", "-", "@", "\t", "\r")) and not _NUMBERS.fullmatch(cell)
+    return f"'{cell}" if is_formula else cell
 
 
 def to_markdown(table: Table) -> str:

@@ -8,6 +8,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from uavexp.config.build import GROUPS
+from uavexp.metrics.evaluate import METRICS
 from uavexp.store.records import canonical_json, restore, trial_name, write_atomically
 
 TABLE, REPLANS = "trials.parquet", "replans.parquet"
@@ -43,10 +45,21 @@ ERROR = "error"  # outcome of a trial that did not run to an end
 _WORLD_NUMBERS = ("clutter_density", "narrowest_gap_m", "straight_line_m")
 _LAP_KINDS = ("sum_s", "median_s", "p99_s")
 _NO_DELAY = {"blocked_since_s": math.nan, "delay_s": math.nan}  # of a record that does not tell
+_OF_REPLANS = ("x_m", "y_m", "z_m", "path_change_m", "iterations", "expansions", "near_change")
 _TARGET = "_target_"
+_OURS = {
+    *FIRST, *FIRST_OF_REPLANS, *_OF_REPLANS, *_WORLD_NUMBERS, *GROUPS, *(metric.column for metric in METRICS),
+    "status", "reason", "world_digest", "code", "lock",
+}  # fmt: skip
+_OURS_BEGIN = ("p_", "wall_", "replans_", "goal_")
 
 Row = dict[str, Any]
 Record = Mapping[str, Any]
+
+
+def is_ours(column: str) -> bool:
+    """Whether a column holds what was measured or configured, so that no axis may be called like it."""
+    return column in _OURS or column.startswith(_OURS_BEGIN)
 
 
 def row_of(record: Record, wall: Mapping[str, Any], labels: Mapping[str, str]) -> Row:

@@ -9,11 +9,13 @@ from typing import Any
 
 from uavexp.config.composition import CommandLine, Composer
 from uavexp.config.overrides import Setting
+from uavexp.errors import ConfigError
 from uavexp.flight import repeat_command
 from uavexp.store.outputs import identity
 from uavexp.store.records import cell_digest, trial_name
 from uavexp.store.resume import Stock, contains, join_studies, take_stock
 from uavexp.store.study import STUDY, WORLDS, Study, StudyCell, read_study
+from uavexp.store.table import is_ours
 from uavexp.sweep.job import Job
 from uavexp.sweep.trial_job import TrialJob, version
 
@@ -48,6 +50,9 @@ def agenda_of(
     """
     identities = [identity(cell) for cell in command.cells]
     study = _study(command, folder, identities)
+    for axis in study.axes:
+        if is_ours(axis):
+            raise ConfigError(f"an axis may not be called {axis}: a column of the trials is; rename the axis")
     if command.experiment is not None:
         from uavexp.report.declared import declared  # pandas and matplotlib, needed by no other command
 
