@@ -10,78 +10,25 @@ import os
 import re
 import sys
 import tempfile
-import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from uavexp.arrays import Float, Int32
 from uavexp.errors import WorldError
-from uavexp.formats import ros_map
-from uavexp.formats.base import FREE, SOLID, UNMEASURED, Cells, Content, Options
+from uavexp.formats.base import Content, Options
 from uavexp.o3d import open3d
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class VoxelFile:
-    """Voxel centres in the file's own frame and unit."""
-
-    occupied: Float  # (N, 3)
-    free: Float | None  # (M, 3) measured free; None when the file does not tell
-    resolution: float  # size of a voxel
 
 
 def read(path: Path, options: Options) -> Content:
     """Return what a file holds."""
     suffix = path.suffix.lower()
-    if suffix == ".npz":
-        return _npz(path)
-    if suffix in (".yaml", ".yml"):
-        return _plan(path, options)
-    if suffix == ".pcd" or (suffix == ".ply" and not ply_counts(path)[1]):
+    if suffix == ".ply" and not ply_counts(path)[1]:
         return Content(kind=f"{suffix[1:]} cloud", points=read_cloud(path))
     vertices, triangles = read_mesh(path)
     return Content(kind=f"{suffix[1:]} mesh", vertices=vertices, triangles=triangles)
-
-
-def files(path: Path) -> tuple[Path, ...]:
-    """Return the other files that a file's content depends on."""
-    return (ros_map.image_path(path),) if path.suffix.lower() in (".yaml", ".yml") else ()
-
-
-def _npz(path: Path) -> Content:
-    voxels = read_voxels(path)
-    return Content(kind="npz voxels", cells=_cells(voxels.occupied, voxels.free, voxels.resolution))
-
-
-def _cells(occupied: Float, free: Float | None, size: float) -> Cells:
-    """Cells of the centres (N, 3) of voxels; without measured free ones all others are free."""
-    known = occupied if free is None else np.concatenate([occupied, free])
-    corner = known.min(axis=0)
-    shape = np.rint((known.max(axis=0) - corner) / size).astype(np.int64) + 1
-    state = np.full(shape, FREE if free is None else UNMEASURED, dtype=np.uint8)
-    if free is not None:
-        state[tuple(np.rint((free - corner) / size).astype(np.int64).T)] = FREE
-    state[tuple(np.rint((occupied - corner) / size).astype(np.int64).T)] = SOLID
-    return Cells(state=state, origin=corner - 0.5 * size, size=np.full(3, size))
-
-
-def _plan(path: Path, options: Options) -> Content:
-    plan = ros_map.read(path)
-    state = np.where(plan.occupied, SOLID, np.where(plan.unknown, UNMEASURED, FREE)).astype(np.uint8)
-    return Content(
-        kind="ROS map",
-        cells=Cells(
-            state=state[..., None],
-            origin=np.array([*plan.origin_m, 0.0]),
-            size=np.array([plan.resolution_m, plan.resolution_m, options.wall_height_m]),
-            yaw_rad=plan.yaw_rad,
-            is_plan=True,
-        ),
-    )
 
 
 def read_mesh(path: Path) -> tuple[Float, Int32]:
@@ -192,8 +139,8 @@ def _obj_faces(path: Path) -> int:
 
 
 def read_cloud(path: Path) -> Float:
-    """Return the points (N, 3) of a pcd or ply file, in the file's unit; invalid (NaN) ones dropped."""
-    promised = _pcd_points(path) if path.suffix.lower() == ".pcd" else ply_counts(path)[0]
+    """Return the points (N, 3) of a ply file, in the file's unit; invalid (NaN) ones dropped."""
+    promised = ply_counts(path)[0]
     with _silence():
         cloud = open3d.io.read_point_cloud(str(path), remove_nan_points=False, remove_infinite_points=False)
     points = np.asarray(cloud.points, dtype=np.float64)
@@ -205,58 +152,6 @@ def read_cloud(path: Path) -> Float:
     if points.shape[0] == 0:
         raise WorldError(f"world file {path} holds no valid points")
     return points
-
-
-def _pcd_points(path: Path) -> int:
-    """Number of points that a pcd header promises; the ascii rows are counted."""
-    data = path.read_bytes()
-    found = re.search(rb"^POINTS\s+(\d+)", data[:4096], re.MULTILINE)
-    begin = re.search(rb"^DATA\s+(\w+)\s*?\n", data[:4096], re.MULTILINE)
-    if found is None or begin is None:
-        raise WorldError(f"world file {path} is no pcd file, or its header is truncated")
-    promised = int(found[1])
-    if begin[1] == b"ascii":
-        rows = sum(1 for line in data[begin.end() :].split(b"\n") if line.strip())
-        if rows < promised:
-            raise WorldError(f"world file {path} is truncated: {promised} points promised, {rows} rows found")
-    return promised
-
-
-def read_voxels(path: Path) -> VoxelFile:
-    """Return the voxels of an npz file.
-
-    Keys: `centres` and `resolution`; or `occupied`, `free` and `resolution` (centres); or
-    `occupied_index`, `free_index`, `origin` and `resolution` (centre = origin + (index +
-    0.5) * resolution). The free ones may be missing.
-    """
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            arrays = {key: np.asarray(data[key], dtype=np.float64) for key in data.files}
-    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, TypeError) as error:
-        raise WorldError(f"world file {path} is damaged, truncated or no npz file") from error
-    resolution = arrays.get("resolution")
-    if resolution is None or resolution.size != 1 or not 0.0 < float(resolution) < np.inf:
-        raise WorldError(f"world file {path} needs a 'resolution' > 0; it has the keys {sorted(arrays)}")
-    size = float(resolution)
-    if "occupied_index" in arrays and "origin" in arrays:
-        origin = arrays["origin"]
-        occupied = origin + (arrays["occupied_index"] + 0.5) * size
-        free = origin + (arrays["free_index"] + 0.5) * size if "free_index" in arrays else None
-    elif "occupied" in arrays or "centres" in arrays:
-        occupied, free = arrays["occupied" if "occupied" in arrays else "centres"], arrays.get("free")
-    else:
-        raise WorldError(
-            f"world file {path} needs 'centres', 'occupied' or 'occupied_index' with 'origin'; "
-            f"it has the keys {sorted(arrays)}"
-        )
-    for name, centres in (("occupied", occupied), ("free", free)):
-        if centres is not None and (centres.ndim != 2 or centres.shape[1] != 3):
-            raise WorldError(f"world file {path}: {name} voxels must be (N, 3), got {centres.shape}")
-        if centres is not None and not np.isfinite(centres).all():
-            raise WorldError(f"world file {path} has {name} voxels that are NaN or infinite")
-    if occupied.shape[0] == 0:
-        raise WorldError(f"world file {path} holds no occupied voxels")
-    return VoxelFile(occupied=occupied, free=free, resolution=size)
 
 
 @contextmanager

@@ -1,116 +1,201 @@
-"""ROS occupancy maps (`map.yaml` and its pgm): which cells are occupied, free, unknown."""
+"""ROS occupancy maps: a yaml file and the image that it names."""
 
 from __future__ import annotations
 
 import math
-import re
+import reprlib
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 import yaml  # type: ignore[import-untyped]  # with omegaconf
+from PIL import Image
 
-from uavexp.arrays import Bool, Float
+from uavexp.arrays import Bool, Float, UInt8
 from uavexp.errors import WorldError
+from uavexp.formats.base import FREE, SOLID, UNMEASURED, Cells, Content, Options
+from uavexp.formats.guard import damaged
 
-MAX_PIXELS = 100_000_000
+MOST_PIXELS = 100_000_000
+MOST_YAML_BYTES = 1 << 20
+IMAGES = ("PNG", "BMP", "PPM")  # what Nav2's map_saver writes; PPM is Pillow's name of pgm's family
+SLAM_GREY = 205  # of 255: with it map_saver paints what it never measured
+
+Mode = Literal["trinary", "scale", "raw"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RosMap:
-    """A plan; cell (i, j) lies at origin + turned by yaw (i, j) * resolution, x right, y up."""
+class Description:
+    """What a map's yaml file says."""
 
-    occupied: Bool  # (X, Y)
-    unknown: Bool  # (X, Y)
+    image: Path
+    mode: Mode
     resolution_m: float
     origin_m: tuple[float, float]
     yaw_rad: float
+    negate: bool
+    occupied_thresh: float
+    free_thresh: float
 
 
-def read(path: Path) -> RosMap:
-    """Return the map of a yaml file.
+def read(path: Path, options: Options) -> Content:
+    """Return the map's cells, one layer from floor to ceiling.
 
-    The rules of ROS map_server: the image's first row is the map's far (high y) one;
-    occupancy p = (255 - value) / 255, or value / 255 with `negate`; occupied when p >
-    occupied_thresh, free when p < free_thresh, unknown between; `mode: raw` is refused.
-
-    Raises:
-        WorldError: either file is missing, damaged, or lacks a key.
+    The rules of Nav2's map_server. The image's first row is the map's far (high y) one. A pixel's
+    occupancy is 1 - brightness, or brightness with `negate`; brightness is the mean of red, green and
+    blue. trinary: solid from `occupied_thresh` on, free up to `free_thresh`, otherwise unmeasured.
+    scale: the same, but between the thresholds occupancy is graded from 0 to 100 %. raw: the pixel's
+    value (of 255) is the occupancy in %, beyond 100 unmeasured. A pixel that is not opaque is unmeasured
+    (not in raw). Graded occupancy, of scale and raw, is solid from 65 % on, free up to 19.6 % and
+    otherwise unmeasured: the thresholds with which ROS reads the trinary maps of map_saver. Missing
+    thresholds are 0.65 and 0.25, map_saver's defaults.
     """
-    entries = _entries(path)
-    if str(entries.get("mode", "trinary")) not in ("trinary", "scale"):
-        raise WorldError(f"world file {path}: mode must be trinary or scale, got {entries['mode']!r}")
-    resolution = _number(path, "resolution", entries["resolution"])
-    if not resolution > 0.0:
-        raise WorldError(f"world file {path}: resolution must be > 0 m, got {resolution}")
-    origin = entries["origin"]
-    if not isinstance(origin, list) or len(origin) != 3:
-        raise WorldError(f"world file {path}: origin must be [x, y, yaw], got {origin!r}")
-    x, y, yaw = (_number(path, "origin", value) for value in origin)
-    occupied_above = _number(path, "occupied_thresh", entries.get("occupied_thresh", 0.65))
-    free_below = _number(path, "free_thresh", entries.get("free_thresh", 0.196))
-    value = read_pgm(path.parent / str(entries["image"]))
-    share = value if _number(path, "negate", entries.get("negate", 0)) else 1.0 - value
-    plan = share[::-1].T  # image rows run down, the map's y runs up
-    occupied = plan > occupied_above
-    return RosMap(
-        occupied=occupied,
-        unknown=~occupied & ~(plan < free_below),
-        resolution_m=resolution,
-        origin_m=(x, y),
-        yaw_rad=yaw,
+    described = describe(path)
+    brightness, opaque = _image(described.image)
+    state = _state(described, brightness)
+    if described.mode != "raw":
+        state[~opaque] = UNMEASURED
+    return Content(
+        kind="ROS map",
+        cells=Cells(
+            state=state[::-1].T[..., None],  # image rows run down, the map's y runs up
+            origin=np.array([*described.origin_m, 0.0]),
+            size=np.array([described.resolution_m, described.resolution_m, options.wall_height_m]),
+            yaw_rad=described.yaw_rad,
+            is_plan=True,
+        ),
+        warnings=_slam_grey(described, brightness, state),
     )
 
 
-def image_path(path: Path) -> Path:
-    """Return the image that a map's yaml file names."""
-    return path.parent / str(_entries(path)["image"])
+def files(path: Path) -> tuple[Path, ...]:
+    """Return the map's image."""
+    return (describe(path).image,)
 
 
-def _entries(path: Path) -> dict[str, Any]:
-    try:
-        entries: Any = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise WorldError(f"world file {path} is no yaml file") from error
-    if not isinstance(entries, dict):
-        raise WorldError(f"world file {path} is no ROS map: it holds no keys")
+def describe(path: Path) -> Description:
+    """Return what the yaml file says; raise `WorldError` in one line where it lacks or mistypes a key."""
+    entries = _entries(path)
     missing = [key for key in ("image", "resolution", "origin") if key not in entries]
     if missing:
         raise WorldError(f"world file {path} is no ROS map: {', '.join(missing)} missing")
+    mode = entries.get("mode", "trinary")
+    if mode not in get_args(Mode):
+        raise WorldError(f"world file {path}: mode must be trinary, scale or raw, got {reprlib.repr(mode)}")
+    resolution = _number(path, "resolution", entries["resolution"])
+    if not resolution > 0.0:
+        raise WorldError(f"world file {path}: resolution must be > 0 m, got {resolution:g}")
+    origin = entries["origin"]
+    if not isinstance(origin, list) or len(origin) != 3:
+        raise WorldError(f"world file {path}: origin must be [x, y, yaw], got {reprlib.repr(origin)}")
+    x, y, yaw = (_number(path, "origin", value) for value in origin)
+    occupied = _number(path, "occupied_thresh", entries.get("occupied_thresh", "0.65"))
+    free = _number(path, "free_thresh", entries.get("free_thresh", "0.25"))
+    if not free < occupied:
+        raise WorldError(f"world file {path}: free_thresh {free:g} must be < occupied_thresh {occupied:g}")
+    if not isinstance(entries["image"], str) or not entries["image"]:
+        raise WorldError(
+            f"world file {path}: image must be a file's name, got {reprlib.repr(entries['image'])}"
+        )
+    return Description(
+        image=path.parent / entries["image"],
+        mode=mode,
+        resolution_m=resolution,
+        origin_m=(x, y),
+        yaw_rad=yaw,
+        negate=_truth(path, "negate", entries.get("negate", "0")),
+        occupied_thresh=occupied,
+        free_thresh=free,
+    )
+
+
+def _entries(path: Path) -> dict[str, Any]:
+    """Words of the yaml file: every scalar as text, since PyYAML does not take `-1e-05` for a number."""
+    if path.stat().st_size > MOST_YAML_BYTES:
+        raise WorldError(f"world file {path} is no ROS map: it has more than {MOST_YAML_BYTES} bytes")
+    try:
+        entries = yaml.load(path.read_bytes(), Loader=yaml.BaseLoader)
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise WorldError(f"world file {path} is no yaml file") from error
+    if not isinstance(entries, dict):
+        raise WorldError(f"world file {path} is no ROS map: it holds no keys")
     return entries
 
 
 def _number(path: Path, name: str, value: object) -> float:
-    if not isinstance(value, int | float) or not math.isfinite(value):
-        raise WorldError(f"world file {path}: {name} must be a number, got {value!r}")
-    return float(value)
+    try:
+        number = float(value) if isinstance(value, str) else math.nan
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise WorldError(f"world file {path}: {name} must be a number, got {reprlib.repr(value)}")
+    return number
 
 
-def read_pgm(path: Path) -> Float:
-    """Return the brightness (rows, columns), 0 to 1, of a pgm image, binary (P5) or plain (P2)."""
-    if not path.is_file():
+def _truth(path: Path, name: str, value: object) -> bool:
+    words = {"true": True, "yes": True, "on": True, "false": False, "no": False, "off": False}
+    if isinstance(value, str) and value.lower() in words:
+        return words[value.lower()]
+    return _number(path, name, value) != 0.0
+
+
+def _image(path: Path) -> tuple[Float, Bool]:
+    """Brightness (rows, columns), 0 to 1, and which pixels are opaque."""
+    if not path.exists():
         raise WorldError(f"map image {path} does not exist")
-    data = path.read_bytes()
-    token = rb"(?:\s|#[^\n]*\n)+"
-    head = re.match(rb"(P[25])" + token + rb"(\d+)" + token + rb"(\d+)" + token + rb"(\d+)\s", data)
-    if head is None:
-        raise WorldError(f"map image {path} is no pgm image (P5 or P2)")
-    width, height, greatest = int(head[2]), int(head[3]), int(head[4])
-    if not (0 < width * height <= MAX_PIXELS and 0 < greatest < 65536):
-        raise WorldError(f"map image {path} has an absurd size: {width} x {height}, up to {greatest}")
-    if head[1] == b"P5":
-        kind = np.dtype(">u2") if greatest > 255 else np.dtype("u1")
-        body = data[head.end() :]
-        found = len(body) // kind.itemsize
-        values = np.frombuffer(body, dtype=kind, count=min(found, width * height))
-    else:
-        try:
-            values = np.array(data[head.end() :].split()[: width * height], dtype=np.float64)
-        except ValueError as error:
-            raise WorldError(f"map image {path} holds something else than numbers") from error
-    if values.size < width * height:
-        raise WorldError(
-            f"map image {path} is truncated: {width * height} pixels expected, {values.size} found"
-        )
-    return values.reshape(height, width).astype(np.float64) / greatest
+    if not path.is_file():
+        raise WorldError(f"map image {path} is no regular file")
+    with damaged(path, "pgm, png or bmp"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # the check below is ours
+        with Image.open(path, formats=IMAGES) as image:
+            width, height = image.size
+            if width * height > MOST_PIXELS:
+                raise WorldError(
+                    f"map image {path} has {width} x {height} pixels, at most {MOST_PIXELS:.0e} are allowed"
+                )
+            return _brightness(image)
+
+
+def _brightness(image: Image.Image) -> tuple[Float, Bool]:
+    if image.mode.startswith("I"):  # 16 bits
+        grey = np.asarray(image, dtype=np.float64) / 65535.0
+        return grey, np.ones(grey.shape, dtype=np.bool_)
+    if image.mode in ("1", "L"):
+        grey = np.asarray(image.convert("L"), dtype=np.float64) / 255.0
+        return grey, np.ones(grey.shape, dtype=np.bool_)
+    channels = np.asarray(image.convert("RGBA"))
+    return channels[..., :3].mean(axis=2) / 255.0, channels[..., 3] == 255
+
+
+def _state(described: Description, brightness: Float) -> UInt8:
+    if described.mode == "raw":
+        value = np.rint(255.0 * brightness)
+        return _graded(np.where(value <= 100.0, value, np.nan))
+    occupancy = brightness if described.negate else 1.0 - brightness
+    low, high = described.free_thresh, described.occupied_thresh
+    if described.mode == "scale":
+        return _graded(np.rint(100.0 * np.clip((occupancy - low) / (high - low), 0.0, 1.0)))
+    return _of(occupancy >= high, occupancy <= low)
+
+
+def _graded(percent: Float) -> UInt8:
+    return _of(percent >= 65.0, percent <= 19.6)
+
+
+def _of(solid: Bool, free: Bool) -> UInt8:
+    return np.where(solid, SOLID, np.where(free, FREE, UNMEASURED)).astype(np.uint8)
+
+
+def _slam_grey(described: Description, brightness: Float, state: UInt8) -> tuple[str, ...]:
+    """A warning when the thresholds call the grey free that means unmeasured."""
+    grey = (np.rint(255.0 * brightness) == SLAM_GREY) & (state == FREE)
+    share = np.count_nonzero(grey) / grey.size
+    if described.mode == "raw" or not share:
+        return ()
+    return (
+        f"{100.0 * share:.3g} % of the map has the grey {SLAM_GREY}, with which map_saver paints what was "
+        f"never measured, and counts as free by free_thresh={described.free_thresh:g}; "
+        "free_thresh: 0.196 keeps it unmeasured",
+    )

@@ -8,7 +8,6 @@ import pytest
 
 from tests.folders import DATA
 from uavexp.errors import ConfigError, UavexpError, WorldError
-from uavexp.formats import ros_map
 from uavexp.geometry import polyline_length_m
 from uavexp.scene import Scene
 from uavexp.types import World
@@ -139,21 +138,12 @@ def ros(folder: Path, pixels: list[list[int]], extra: str = "", origin: str = "[
     return path
 
 
-def test_ros_map_rows_run_down_and_thresholds_hold(tmp_path: Path) -> None:
-    plan = ros_map.read(ros(tmp_path, [[0, 254, 205], [254, 254, 0]]))
-    np.testing.assert_array_equal(plan.occupied, [[False, True], [False, False], [True, False]])
-    np.testing.assert_array_equal(plan.unknown, [[False, False], [False, False], [False, True]])
-    negated = ros_map.read(ros(tmp_path, [[255, 1, 100], [1, 1, 255]], "negate: 1\n"))
-    np.testing.assert_array_equal(negated.occupied, plan.occupied)
-    np.testing.assert_array_equal(negated.unknown, plan.unknown)
-
-
 @pytest.mark.parametrize(("unknown", "left"), [("wall", 1.5), ("free", 2.0)])
 def test_ros_map_is_extruded_where_its_origin_and_yaw_say(tmp_path: Path, unknown: str, left: float) -> None:
     pixels = [[254] * 20 for _ in range(20)]
     pixels[-1] = [0] * 20  # the lowest row: y from 0 to 0.5 m in the map's frame
     pixels[10][3] = 205
-    turned = ros(tmp_path, pixels, origin="[5.0, 1.0, 1.5707963267948966]")
+    turned = ros(tmp_path, pixels, "free_thresh: 0.196", origin="[5.0, 1.0, 1.5707963267948966]")
     world = File(
         path=str(turned),
         unknown=unknown,
@@ -235,7 +225,7 @@ def test_missing_files_and_folders_are_named(tmp_path: Path) -> None:
     [
         ({"centres": np.zeros((3, 3))}, "resolution"),
         ({"centres": np.zeros((3, 3)), "resolution": 0.0}, "resolution"),
-        ({"points": np.zeros((3, 3)), "resolution": 0.1}, "occupied"),
+        ({"cells": np.zeros((3, 3)), "resolution": 0.1}, "occupied"),
         ({"centres": np.zeros((3, 2)), "resolution": 0.1}, r"\(N, 3\)"),
         ({"centres": np.full((3, 3), np.nan), "resolution": 0.1}, "NaN"),
         ({"centres": np.zeros((0, 3)), "resolution": 0.1}, "no occupied"),
@@ -256,7 +246,7 @@ def test_bad_voxel_files_name_the_key(tmp_path: Path, arrays: dict[str, object],
         ("image: m.pgm\nresolution: 0.05\norigin: [0, 0]\n", "origin"),
         ("image: other.pgm\nresolution: 0.05\norigin: [0, 0, 0]\n", "does not exist"),
         ("image: m.pgm\nresolution: 0.05\norigin: [0, 0, 0]\n", "truncated"),
-        ("image: m.pgm\nresolution: 0.05\norigin: [0, 0, 0]\nmode: raw\n", "mode"),
+        ("image: m.pgm\nresolution: 0.05\norigin: [0, 0, 0]\nmode: grey\n", "mode"),
     ],
 )
 def test_bad_ros_maps_name_the_key(tmp_path: Path, text: str, word: str) -> None:
