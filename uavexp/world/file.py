@@ -48,8 +48,8 @@ Box = Annotated[
 class File:
     """A world read from a file; lengths below are in m in the converted frame, z up."""
 
-    path: Annotated[str, Constraint("the name of a world file", bool)]  # mesh ply obj stl glb, cloud pcd ply,
-    # voxels npz, ROS map yaml; relative to the working directory
+    path: Annotated[str, Constraint("the name of a world file", bool)]  # mesh ply obj stl glb; cloud pcd ply xyz
+    # pts npz las laz; voxels npz bt ot 3dmap; plan ROS yaml, dxf, wkt; relative to the working directory
     unit_m: Positive = 1.0  # m, length of one unit of the file (0.001 for mm, 0.0254 for inches)
     up_axis: Literal["x", "y", "z", "-x", "-y", "-z"] = "z"  # the file's axis that points up:
     # x y z -x -y -z (glb: y)
@@ -61,7 +61,8 @@ class File:
     flight_height_m: Finite = 1.2  # m, z of a drawn start and target [ours]
     least_distance_m: NonNegative = 8.0  # m, between a drawn start and target [ours]
     voxel_size_m: Positive = 0.1  # m, voxels that a point cloud is turned into [ours]
-    wall_height_m: Positive = 2.5  # m, to which a ROS map is extruded from its floor at z = 0 [ours]
+    wall_height_m: Positive = 2.5  # m, to which a plan (ROS map, dxf, wkt) is extruded from z = 0 [ours]
+    layers: tuple[str, ...] = ()  # names of a dxf's layers that are walls; none: all that are switched on
     unknown: Literal["wall", "free"] = "wall"  # wall or free: unknown cells of a ROS map,
     # or of voxels with measured free ones [ours]
     max_map_gib: Positive = 2.0  # GiB, memory that the map of the flight bounds may need at 0.1 m [ours]
@@ -106,7 +107,8 @@ class File:
 
     def _geometry(self) -> tuple[Float32, Int32]:
         """Triangles of the file, in m, z up."""
-        options = formats.Options(wall_height_m=self.wall_height_m)
+        # a reader's lengths are the file's own
+        options = formats.Options(wall_height_m=self.wall_height_m / self.unit_m, layers=self.layers)
         content = formats.read(Path(self.path), options)
         if content.cells is not None and content.cells.is_plan:
             require(
