@@ -48,8 +48,8 @@ Box = Annotated[
 class File:
     """A world read from a file; lengths below are in m in the converted frame, z up."""
 
-    path: Annotated[str, Constraint("the name of a world file", bool)]  # mesh ply obj stl glb; cloud pcd ply xyz
-    # pts npz las laz; voxels npz bt ot 3dmap; plan ROS yaml, dxf, wkt; relative to the working directory
+    path: Annotated[str, Constraint("the name of a world file", bool)]  # mesh ply obj stl glb; cloud pcd ply
+    # xyz pts npz las laz; voxels npz bt ot 3dmap; plan yaml (ROS) dxf wkt; relative to the working directory
     unit_m: Positive = 1.0  # m, length of one unit of the file (0.001 for mm, 0.0254 for inches)
     up_axis: Literal["x", "y", "z", "-x", "-y", "-z"] = "z"  # the file's axis that points up:
     # x y z -x -y -z (glb: y)
