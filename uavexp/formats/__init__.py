@@ -11,6 +11,8 @@ from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
+
 from uavexp.errors import WorldError
 from uavexp.formats.base import FREE, SOLID, UNMEASURED, Cells, Content, Options
 
@@ -22,7 +24,8 @@ READERS = {
     ".ply": "ply",
     ".obj": "obj",
     ".stl": "stl",
-    ".glb": "older",
+    ".glb": "gltf",
+    ".gltf": "gltf",
     ".pcd": "pcd",
     ".xyz": "xyz",
     ".pts": "xyz",
@@ -47,7 +50,8 @@ def read(path: Path, options: Options) -> Content:
     """Return what a file holds; raise `WorldError` in one line when it cannot be read whole."""
     _check_file(path)
     try:
-        content: Content = _module(path).read(path, options)
+        with np.errstate(all="ignore"):  # what overflows is found not to be finite
+            content: Content = _module(path).read(path, options)
     except MemoryError as error:
         raise WorldError(f"world file {path} holds more than the memory does; give a part of it") from error
     return content
