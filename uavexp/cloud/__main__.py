@@ -9,6 +9,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from uavexp import formats
 from uavexp.cloud.cloud_file import read_cloud
 from uavexp.cloud.pipeline import CloudPipeline
 from uavexp.errors import UavexpError
@@ -17,7 +18,7 @@ from uavexp.errors import UavexpError
 def main(arguments: Sequence[str]) -> int:
     """Print the counts and return the exit code: 0, or 2 for bad input."""
     parser = argparse.ArgumentParser(prog="python -m uavexp.cloud", description=__doc__)
-    parser.add_argument("file", type=Path, help=".ply .pcd .xyz .pts, or .npz with points or occupied")
+    parser.add_argument("file", type=Path, help=f"one of {' '.join(formats.READERS)}")
     parser.add_argument("--voxel", type=float, default=0.03, metavar="M", help="edge of a voxel, m")
     parser.add_argument("--truth", type=float, nargs=3, metavar=("X", "Y", "Z"), help="true dimensions, m")
     parser.add_argument("--seed", type=int, default=0, help="of the plane search")

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import zipfile
 from pathlib import Path
 
 import numpy as np
 
+from uavexp import formats
 from uavexp.arrays import Float
 from uavexp.errors import UavexpError
-
-_OPEN3D = (".ply", ".pcd", ".xyz", ".pts")
 
 
 class CloudError(UavexpError):
@@ -36,28 +34,22 @@ def checked(points_m: Float) -> Float:
 
 
 def read_cloud(path: Path) -> Float:
-    """Points (N, 3), m, of a .ply, .pcd, .xyz or .pts file, or an .npz with `points` or `occupied`.
+    """Points (N, 3), in the file's unit, of any format of `uavexp.formats`.
+
+    Of voxels the centres of the solid ones, of a mesh its vertices.
 
     Raises:
-        CloudError: missing, damaged or empty.
+        WorldError: missing, damaged or of another format.
+        CloudError: a plan, or nothing finite in it.
     """
-    if not path.is_file():
-        raise CloudError(f"{path}: no such file")
-    if path.suffix == ".npz":
-        try:
-            with np.load(path) as stored:
-                name = next(name for name in ("points", "points_m", "occupied") if name in stored)
-                points = np.asarray(stored[name])
-        except (OSError, ValueError, EOFError, StopIteration, zipfile.BadZipFile):
-            raise CloudError(f"{path}: no points or occupied (N, 3) in it") from None
-    elif path.suffix in _OPEN3D:
-        from uavexp.o3d import open3d
-
-        points = np.asarray(open3d.io.read_point_cloud(str(path), remove_nan_points=True).points)
-        if not len(points):  # Open3D reads a damaged file as an empty one
-            raise CloudError(f"{path}: no point cloud in it")
+    content = formats.read(path, formats.Options())
+    if content.cells is None:
+        points = content.points if len(content.points) else content.vertices
+    elif content.cells.is_plan:
+        raise CloudError(f"{path}: a {content.kind} is no cloud")
     else:
-        raise CloudError(f"{path}: a cloud is {', '.join(_OPEN3D)} or .npz")
+        index = np.argwhere(content.cells.state == formats.SOLID)
+        points = content.cells.origin + (index + 0.5) * content.cells.size
     try:
         return checked(points)
     except CloudError as error:

@@ -1,6 +1,6 @@
 """Plain A*, the traditional method of paper 2: shortest voxel path, movers where they are now.
 
-    python -m uavexp.planner.astar MAP.npz SCENARIOS.3dscen --limit 200
+    python -m uavexp.planner.astar MAP.3dmap SCENARIOS.3dscen --limit 200
 
 solves problems of the voxel path benchmark and compares their costs with the published ones.
 """

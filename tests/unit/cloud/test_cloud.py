@@ -18,7 +18,7 @@ from uavexp.cloud.planes import fit_planes, plane_of
 from uavexp.cloud.simulated_scan import simulated_scan
 from uavexp.cloud.traversability import obstacles
 from uavexp.cloud.voxels import packed, unpacked, voxelise
-from uavexp.errors import ConfigError
+from uavexp.errors import ConfigError, WorldError
 from uavexp.scene import Scene
 from uavexp.world.boxes import Boxes
 
@@ -180,8 +180,23 @@ def test_bad_files_are_one_line_and_exit_code_2(tmp_path: Path, capsys: pytest.C
         error = capsys.readouterr().err
         assert error.count("\n") == 1
         assert name in error
-    with pytest.raises(CloudError):
+    with pytest.raises(WorldError):
         read_cloud(tmp_path / "missing.ply")
+
+
+def test_a_cloud_is_read_whatever_its_format_and_case(tmp_path: Path) -> None:
+    points = np.random.default_rng(0).uniform(0.0, 2.0, (50, 3)).round(3)
+    np.savetxt(tmp_path / "ROOM.XYZ", points)
+    np.savez(tmp_path / "voxels.npz", occupied=np.floor(points) + 0.5, resolution=1.0)
+    np.testing.assert_allclose(read_cloud(tmp_path / "ROOM.XYZ"), points)
+    np.testing.assert_allclose(read_cloud(tmp_path / "voxels.npz"), np.unique(np.floor(points) + 0.5, axis=0))
+
+
+def test_a_plan_is_no_cloud(tmp_path: Path) -> None:
+    (tmp_path / "m.pgm").write_bytes(b"P2 1 1 255 0")
+    (tmp_path / "m.yaml").write_text("image: m.pgm\nresolution: 1\norigin: [0, 0, 0]\n")
+    with pytest.raises(CloudError, match="no cloud"):
+        read_cloud(tmp_path / "m.yaml")
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,7 @@
 """Problems of the voxel path benchmark (Brewer and Sturtevant 2018) against their published optima.
 
-MAP.npz holds `size` (3,) and `blocked` (N, 3) cells; SCENARIOS.3dscen two lines of heading, then
-a line for each problem: start and goal cell, optimal cost, and a ratio that is not used.
+MAP is a .3dmap, or an npz with `size` (3,) and `blocked` (N, 3) cells; SCENARIOS.3dscen has two lines
+of heading, then a line for each problem: start and goal cell, optimal cost, and a ratio that is not used.
 """
 
 from __future__ import annotations
@@ -10,19 +10,18 @@ import argparse
 import json
 import sys
 import time
-import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from uavexp import formats
 from uavexp.arrays import Bool, Float
 from uavexp.errors import UavexpError
 from uavexp.planner.find.voxels.voxel_grid import VoxelGrid
 
 _COLUMNS = 8
 _TOLERANCE = 1e-6  # voxels; costs are printed with 8 decimals
-_MOST_CELLS = 1 << 31
 
 
 class BenchmarkError(UavexpError):
@@ -30,22 +29,11 @@ class BenchmarkError(UavexpError):
 
 
 def read_map(path: Path) -> Bool:
-    """Free cells (X, Y, Z) of a map file."""
-    try:
-        with np.load(path) as stored:
-            size, blocked = np.asarray(stored["size"]), np.asarray(stored["blocked"])
-    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile) as error:
-        raise BenchmarkError(f"{path}: no map with size and blocked ({_line(error)})") from None
-    integers = np.issubdtype(size.dtype, np.integer) and np.issubdtype(blocked.dtype, np.integer)
-    if not integers or size.shape != (3,) or blocked.ndim != 2 or blocked.shape[1] != 3:
-        raise BenchmarkError(f"{path}: size must be 3 and blocked (N, 3) whole numbers")
-    size, blocked = size.astype(np.int64), blocked.astype(np.int64)
-    if size.min() < 1 or float(np.prod(size.astype(np.float64))) > _MOST_CELLS:
-        raise BenchmarkError(f"{path}: a map of {size.tolist()} cells cannot be searched")
-    if ((blocked < 0) | (blocked >= size)).any():
-        raise BenchmarkError(f"{path}: blocked cells lie outside the map of {size.tolist()} cells")
-    free: Bool = np.ones(size, dtype=np.bool_)
-    free[tuple(blocked.T)] = False
+    """Free cells (X, Y, Z) of a map file: .3dmap, or another format of `uavexp.formats` that has cells."""
+    cells = formats.read(path, formats.Options()).cells
+    if cells is None or cells.is_plan:
+        raise BenchmarkError(f"{path}: no voxels in it; a .3dmap, or an npz with size and blocked, is needed")
+    free: Bool = cells.state == formats.FREE
     return free
 
 
@@ -100,7 +88,7 @@ def solve(free: Bool, problems: Float) -> dict[str, float | int]:
 def main(arguments: Sequence[str]) -> int:
     """Print one line of JSON; 0 when every cost is the published one, 1 when not, 2 for bad input."""
     parser = argparse.ArgumentParser(prog="python -m uavexp.planner.astar", description=__doc__)
-    parser.add_argument("map", type=Path, help="MAP.npz")
+    parser.add_argument("map", type=Path, help="MAP.3dmap or MAP.npz")
     parser.add_argument("scenarios", type=Path, help="SCENARIOS.3dscen")
     parser.add_argument("--limit", type=int, help="problems, spread evenly over the file (default: all)")
     options = parser.parse_args(arguments)
