@@ -26,6 +26,7 @@ READERS = {
     ".stl": "stl",
     ".glb": "gltf",
     ".gltf": "gltf",
+    ".dae": "collada",
     ".pcd": "pcd",
     ".xyz": "xyz",
     ".pts": "xyz",
@@ -43,7 +44,7 @@ READERS = {
     ".wkt": "wkt",
 }
 # modules of the extra `formats` by their packages' names
-PACKAGES = {"collada": "pycollada", "ezdxf": "ezdxf", "laspy": "laspy", "shapely": "shapely"}
+PACKAGES = {"ezdxf": "ezdxf", "laspy": "laspy", "shapely": "shapely"}
 
 
 def read(path: Path, options: Options) -> Content:

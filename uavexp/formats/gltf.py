@@ -90,7 +90,7 @@ def _scene(document: Document) -> Content:
         (len(document.json.get("scenes", [])) > 1, "of several scenes the default one was read"),
     )
     kind = f"{document.path.suffix[1:].lower()} mesh"
-    return parts.content(kind, tuple(text for holds, text in warnings if holds))
+    return parts.content(kind, tuple(text for holds, text in warnings if holds), unit_m=1.0, up_axis="y")
 
 
 def _roots(document: Document) -> list[int]:

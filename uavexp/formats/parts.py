@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -50,6 +51,9 @@ class Parts:
         """All vertices (V, 3) in the scene's frame."""
         return np.concatenate(self._vertices)
 
-    def content(self, kind: str, warnings: tuple[str, ...] = ()) -> Content:
-        """Return all of them as one mesh."""
-        return mesh(self.path, kind, self.vertices, np.concatenate(self._triangles), warnings)
+    def content(
+        self, kind: str, warnings: tuple[str, ...], *, unit_m: float | None = None, up_axis: str | None = None
+    ) -> Content:
+        """Return all of them as one mesh; see `Content`."""
+        content = mesh(self.path, kind, self.vertices, np.concatenate(self._triangles), warnings)
+        return replace(content, unit_m=unit_m, up_axis=up_axis)

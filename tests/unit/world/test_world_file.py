@@ -197,7 +197,7 @@ def bad_files() -> dict[str, tuple[bytes, str]]:
         "text.npz": (b"this is no archive\n" * 30, "damaged"),
         "text.yaml": (b"just a text\n", "no ROS map"),
         "broken.yaml": (b"image: [\n", "no yaml"),
-        "mesh.dae": (b"<COLLADA/>", "extension"),
+        "mesh.fbx": (b"Kaydara", "extension"),
         "map.pgm": (b"P5\n1 1\n255\n0", "yaml"),
     }
 
