@@ -4,29 +4,26 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
-from collections.abc import Callable, Generator, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Generator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from uavexp.config.composition import CommandLine
 from uavexp.errors import ConfigError, RecordError, UavexpError, one_line
-from uavexp.flight import check_world, fly_cell
+from uavexp.flight import fly_cell
 from uavexp.store.folder import folder_of, opened, put_trial, put_world, remove_unfinished, set_aside
 from uavexp.store.history import FLYING, Run
-from uavexp.store.records import Status, write_text
+from uavexp.store.records import Status, canonical_json, write_text
 from uavexp.store.study import STUDY, collect, study_text
 from uavexp.sweep import kernels
 from uavexp.sweep.agenda import Agenda, agenda_of
 from uavexp.sweep.audience import Audience
 from uavexp.sweep.dask import run_dask
-from uavexp.sweep.faults import reason_of
 from uavexp.sweep.head_start import PRELOAD
 from uavexp.sweep.job import Done, Job
 from uavexp.sweep.local import Watch, run_local, start_fork_server
 from uavexp.sweep.runner import Backend, Runner, read_runner
-from uavexp.sweep.trial_job import TrialJob, files_of, fly_job, fly_job_elsewhere, version
+from uavexp.sweep.trial_job import TrialJob, WorldCheck, do_job, do_job_elsewhere, files_of, version
 
 _WARM_UP_S = 3.0  # simulated: by then every kernel of a flight has been called
 
@@ -72,21 +69,28 @@ def _prepare(agenda: Agenda, runner: Runner, audience: Audience) -> None:
 
 def _fly_agenda(agenda: Agenda, command: CommandLine, audience: Audience, run: Run, runner: Runner) -> int:
     folder, kept, failed = agenda.study.folder, 0, 0
+    checks = _world_checks(agenda)
+    unchecked, waiting = len(checks), list[Done]()
     with (
         audience.progress(agenda),
-        _worlds_checked(agenda) as wait_for_worlds,
-        contextlib.closing(_fly(agenda, runner, audience.watch)) as flying,
+        contextlib.closing(_fly(checks, agenda.left, runner, audience.watch)) as flying,
     ):
         try:
             for done in flying:
-                if not kept:
-                    wait_for_worlds()
-                    _refuse_bad_input(agenda, done)
-                    _begin(agenda, run)
-                _keep(folder, done)
-                kept += 1
-                failed += done.answer.status is not Status.OK
-                audience.finished(done)
+                if isinstance(done.job.payload, WorldCheck):
+                    _refuse_bad_world(done)
+                    unchecked -= 1
+                else:
+                    waiting.append(done)
+                while waiting and not unchecked:  # nothing is kept of a command that is refused
+                    done = waiting.pop(0)
+                    if not kept:
+                        _refuse_bad_input(agenda, done)
+                        _begin(agenda, run)
+                    _keep(folder, done)
+                    kept += 1
+                    failed += done.answer.status is not Status.OK
+                    audience.finished(done)
         except (KeyboardInterrupt, UavexpError) as error:
             with contextlib.suppress(RecordError):
                 if (folder / STUDY).exists():
@@ -109,13 +113,27 @@ def _ending(error: BaseException, folder: Path) -> str:
     return f"failed: {one_line(error).replace(str(folder), folder.name)}"
 
 
-def _fly(agenda: Agenda, runner: Runner, watch: Watch) -> Generator[Done, None, None]:
-    """Fly what is left, each trial in a process of its own."""
-    workers = min(runner.workers, max(1, len(agenda.left)))
+def _world_checks(agenda: Agenda) -> list[Job]:
+    """A job for each distinct world, with its first seed; none for a trial alone, which tells by itself."""
+    first: dict[str, Job] = {}
+    for job in agenda.left if len(agenda.jobs) > 1 else ():
+        config = job.payload.cell.config
+        first.setdefault(canonical_json([config["world"], config["world_seed"]]), job)
+    return [
+        Job(name=f"world of {job.name}", label=f"world of {job.label}", payload=WorldCheck(trial=job.payload))
+        for job in first.values()
+    ]
+
+
+def _fly(
+    checks: Sequence[Job], left: Sequence[Job], runner: Runner, watch: Watch
+) -> Generator[Done, None, None]:
+    """Make the worlds and fly what is left, in other processes."""
+    workers = min(runner.workers, max(1, len(left)))
     if runner.backend == Backend.DASK:
         return run_dask(
-            fly_job_elsewhere,
-            agenda.left,
+            do_job_elsewhere,
+            [*checks, *left],
             address=runner.address,
             queue=runner.queue,
             n_jobs=workers,
@@ -123,7 +141,16 @@ def _fly(agenda: Agenda, runner: Runner, watch: Watch) -> Generator[Done, None, 
             preload=[PRELOAD],
             version=version,
         )
-    return run_local(fly_job, agenda.left, n_jobs=workers, limits=runner.limits, watch=watch)
+    return run_local(do_job, [*checks, *left], n_jobs=workers, limits=runner.limits, watch=watch)
+
+
+def _refuse_bad_world(done: Done) -> None:
+    """End a command of which a world cannot be made, whatever its making came to."""
+    if done.answer.mendable:
+        raise ConfigError(done.answer.reason.partition(": ")[2])
+    if done.answer.status is not Status.OK:
+        world = done.job.payload.trial.cell.options["world"]
+        raise ConfigError(f"world={world} cannot be made: {done.answer.reason}")
 
 
 def _refuse_bad_input(agenda: Agenda, done: Done) -> None:
@@ -149,29 +176,6 @@ def _keep(folder: Path, done: Done) -> None:
         if data is not None:
             put_world(folder, digest, data)
     put_trial(folder, done.job.name, files_of(done.job, done.answer, done.wall_s))
-
-
-@contextlib.contextmanager
-def _worlds_checked(agenda: Agenda) -> Iterator[Callable[[], None]]:
-    """Check the worlds beside the first flights, of which none is kept before this has ended well."""
-    asked = [job.payload for job in agenda.left] if len(agenda.jobs) > 1 else []
-    with ThreadPoolExecutor(max_workers=1) as pool:
-        yield pool.submit(_check_worlds, asked).result
-
-
-def _check_worlds(asked: Sequence[TrialJob]) -> None:
-    """Make the first seed of each distinct world, so that a bad one is told before anything is kept."""
-    checked: list[Any] = []
-    for trial in asked:
-        world = trial.cell.config["world"], trial.cell.config["world_seed"]
-        if world not in checked:
-            checked.append(world)
-            try:
-                check_world(trial.cell, trial.seed, trial.keep_world)
-            except UavexpError:
-                raise
-            except Exception as error:
-                raise ConfigError(f"world={trial.cell.options['world']}: {reason_of(error)}") from error
 
 
 def _compile_kernels(job: Job) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 from uavexp.config.composition import Cell
 from uavexp.errors import RecordError
-from uavexp.flight import Trial, fly_cell
+from uavexp.flight import Trial, check_world, fly_cell
 from uavexp.store.outputs import failure_files, trial_files
 from uavexp.store.records import PICTURE, code_digest, lock_digest
 from uavexp.store.world_cache import kept
@@ -38,6 +38,13 @@ class TrialJob:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class WorldCheck:
+    """The world of a trial, made before any flight in it counts; the payload of its job."""
+
+    trial: TrialJob
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Flown:
     """A flown trial as the files that it becomes."""
 
@@ -46,6 +53,14 @@ class Flown:
     outcome: str
     success: bool
     reason: str
+
+
+def do_job(asked: TrialJob | WorldCheck, progress: Progress) -> Flown | None:
+    """Fly a trial or make a world, in a process that may die of a stranger's file."""
+    if isinstance(asked, WorldCheck):
+        check_world(asked.trial.cell, asked.trial.seed, asked.trial.keep_world)
+        return None
+    return fly_job(asked, progress)
 
 
 def fly_job(asked: TrialJob, progress: Progress) -> Flown:
@@ -77,15 +92,16 @@ def version() -> dict[str, Any]:
     return {"code": code_digest(), "lock": lock_digest()}
 
 
-def fly_job_elsewhere(asked: TrialJob, progress: Progress) -> Flown:
-    """Fly one trial on a worker, which must run the version that the record will name.
+def do_job_elsewhere(asked: TrialJob | WorldCheck, progress: Progress) -> Flown | None:
+    """The same on a worker, which must run the version that the record will name.
 
     Raises:
         RecordError: it runs another one.
     """
-    if version() != asked.version:
+    trial = asked.trial if isinstance(asked, WorldCheck) else asked
+    if version() != trial.version:
         raise RecordError("this Dask worker runs another version of uavexp than the command")
-    return fly_job(asked, progress)
+    return do_job(asked, progress)
 
 
 def files_of(job: Job, answer: Answer, wall_s: float) -> dict[str, bytes]:
