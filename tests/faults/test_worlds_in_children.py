@@ -1,4 +1,4 @@
-"""A stranger's world is made in a child under limits: what its making comes to is one line, and nothing is kept."""
+"""A stranger's world is made in a child under limits: whatever that comes to is one line; nothing is kept."""
 
 from __future__ import annotations
 
