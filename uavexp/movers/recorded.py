@@ -1,5 +1,8 @@
 """Real people: recorded tracks, placed in a room as upright cylinders.
 
+Rows of a file may stand in any order; one that stands there twice counts once, and whoever is in two
+places at one time is refused (`track_files`).
+
 The recording is turned by a quarter turn, shifted and cut out of its own time, each drawn from
 the seed unless given. The area that the tracks cover is laid into the flight area where it is
 the smaller one; where it is the larger one it covers the flight area, and people are absent
@@ -25,9 +28,9 @@ from scipy.interpolate import CubicHermiteSpline
 from uavexp.arrays import Bool, Float
 from uavexp.bodies import ABSENT_M
 from uavexp.errors import WorldError
+from uavexp.movers import track_files
 from uavexp.movers.placing import FLOOR_GAP_M, Air
 from uavexp.movers.timeline import ROW_S, Timeline, row_of
-from uavexp.movers.tracks_file import read_tracks
 from uavexp.parameters import Constraint, Finite, NonNegative, Positive, between, option
 from uavexp.scene import Scene
 from uavexp.types import Bodies, Limits, Shape, World
@@ -39,10 +42,10 @@ _TEST_ROWS = 10  # between the places that are tested for room
 class Recorded:
     """Recorded tracks of people, at true speed unless scaled."""
 
-    path: Annotated[
-        str, Constraint("a csv file with columns t_s, id, x_m, y_m", bool)
-    ]  # csv file with columns
-    # t_s, id, x_m, y_m: s, a person's name, m, m
+    path: Annotated[str, Constraint("the name of a file of tracks", bool)]  # csv with columns t_s, id,
+    # x_m, y_m (s, a name, m, m) or frame, id, x, y; txt of PedPy or obsmat; TrajNet++ ndjson; JuPedSim sqlite
+    unit_m: Positive | None = None  # m, length of one unit of the file; null: as it says, or 1 m
+    frame_rate_hz: Positive | None = None  # Hz, of a file that counts frames; null: as it says
     scale: Positive = 1.0  # of the recorded places; below 1 people are slower too [ours]
     begin_s: Finite | None = None  # s, of the recording's own clock, where the flight begins;
     # null: by seed [ours]
@@ -66,7 +69,8 @@ class Recorded:
         Raises:
             WorldError: the file is bad, or nobody is in it at the time chosen.
         """
-        tracks = list(read_tracks(Path(self.path)).values())
+        given = track_files.Options(unit_m=self.unit_m, frame_rate_hz=self.frame_rate_hz)
+        tracks = list(track_files.read(Path(self.path), given).values())
         turn, late, *shift = rng.random(4)
         first_s, last_s = min(t[0, 0] for t in tracks), max(t[-1, 0] for t in tracks)
         spare_s = max(0.0, last_s - first_s - self.duration_s)
