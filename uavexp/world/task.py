@@ -16,6 +16,7 @@ from scipy import ndimage
 from uavexp.arrays import Float, Float32, Int32
 from uavexp.geometry import polyline_length_m
 from uavexp.scene import Scene
+from uavexp.space import Space
 from uavexp.types import Difficulty, World
 from uavexp.world.line_of_sight import skip_ahead, tighten
 from uavexp.world.shortest import (
@@ -25,6 +26,7 @@ from uavexp.world.shortest import (
     proof_radius_m,
     shortest_lattice_path,
 )
+from uavexp.world.solidity import space_of_mesh
 
 CELL_M = 0.1  # spacing of the lattice on which the shortest path is exact
 FINE_CELL_M = 0.05  # tried where that one is too coarse for a building's passages
@@ -159,11 +161,13 @@ def assemble(
     bounds_m: Float,
     flight_bounds_m: Float,
     path_m: Float,
+    space: Space | None = None,
+    notes: tuple[str, ...] = (),
 ) -> World:
     """Return the world of a geometry and the shortest path in it (from which start and target come).
 
     The start yaw is the bearing of the target, not the direction of the path, which the
-    vehicle cannot know.
+    vehicle cannot know. Without a `space` it is that of the mesh.
     """
     start, target = path_m[0], path_m[-1]
     yaw = math.atan2(target[1] - start[1], target[0] - start[0])
@@ -189,4 +193,6 @@ def assemble(
         shortest_path=path_m,
         difficulty=difficulty,
         digest=digest.hexdigest(),
+        space=space_of_mesh(vertices_m, triangles) if space is None else space,
+        notes=notes,
     )

@@ -6,10 +6,10 @@ import numba as nb
 import numpy as np
 from scipy import ndimage
 
-from uavexp.arrays import Bool, Float, Float32, Int, Int32
+from uavexp.arrays import Bool, Float, Int32
 from uavexp.errors import require, require_positive
-from uavexp.triangle_grid import box_meets_triangle
 from uavexp.types import World
+from uavexp.world.raster import rasterise
 
 _MAX_VOXELS = 1 << 31
 
@@ -37,7 +37,7 @@ def voxel_model(world: World, voxel_size_m: float, bounds_m: Float | None = None
         bool((shape >= 1).all()) and int(np.prod(shape)) <= _MAX_VOXELS,
         f"voxel_size_m {voxel_size_m:g} makes {' x '.join(map(str, shape))} voxels of the bounds",
     )
-    surface = _rasterise(world.vertices_m, world.triangles, bounds[0].copy(), voxel_size_m, shape)
+    surface = rasterise(world.vertices_m, world.triangles, bounds[0].copy(), voxel_size_m, shape)
     start = np.floor((world.start_m - bounds[0]) / voxel_size_m).astype(np.int64)
     require(
         bool(((start >= 0) & (start < shape)).all()) and not surface[tuple(start)],
@@ -47,43 +47,20 @@ def voxel_model(world: World, voxel_size_m: float, bounds_m: Float | None = None
     return np.asarray(part != part[tuple(start)]), bounds[0].copy()
 
 
-@nb.njit(cache=True)
-def _rasterise(vertices: Float32, triangles: Int32, low: Float, voxel: float, shape: Int) -> Bool:
-    """Voxels (X, Y, Z) that a triangle enters."""
-    occupied = np.zeros((shape[0], shape[1], shape[2]), dtype=np.bool_)
-    upright, half = np.eye(3), np.full(3, 0.501 * voxel)
-    corner, centre = np.empty((3, 3)), np.empty(3)
-    first, last = np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64)
-    for t in range(triangles.shape[0]):
-        for n in range(3):
-            for axis in range(3):
-                corner[n, axis] = vertices[triangles[t, n], axis]
-        for axis in range(3):
-            least, most = corner[:, axis].min(), corner[:, axis].max()
-            first[axis] = max(int(np.floor((least - low[axis]) / voxel + 0.001)), 0)
-            end = max(int(np.ceil((most - low[axis]) / voxel - 0.001)) - 1, first[axis])
-            last[axis] = min(end, shape[axis] - 1)
-        for i in range(first[0], last[0] + 1):
-            centre[0] = low[0] + (i + 0.5) * voxel
-            for j in range(first[1], last[1] + 1):
-                centre[1] = low[1] + (j + 0.5) * voxel
-                for k in range(first[2], last[2] + 1):
-                    if occupied[i, j, k]:
-                        continue
-                    centre[2] = low[2] + (k + 0.5) * voxel
-                    occupied[i, j, k] = box_meets_triangle(corner, centre, upright, half)
-    return occupied
-
-
 def inflate(occupied: Bool, radius_voxels: float) -> Bool:
     """Voxels (X, Y, Z) whose centre lies nearer than a radius to the centre of an occupied one."""
-    reach = int(np.ceil(radius_voxels))
+    return np.asarray(squared_distance(occupied, radius_voxels) < radius_voxels**2)
+
+
+def squared_distance(occupied: Bool, reach_voxels: float) -> Int32:
+    """Squared distance (X, Y, Z) to the nearest occupied voxel, in voxels; too large where none is near."""
+    reach = int(np.ceil(reach_voxels))
     cap = (reach + 1) ** 2
-    squared = np.where(occupied, 0, cap).astype(np.int32)
+    squared = np.where(occupied, np.int32(0), np.int32(cap))
     for axis in range(3):
         squared = _spread(np.ascontiguousarray(np.moveaxis(squared, axis, 0)), reach)
         squared = np.moveaxis(squared, 0, axis)
-    return np.asarray(squared < radius_voxels**2)
+    return squared
 
 
 @nb.njit(cache=True)
