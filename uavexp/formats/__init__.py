@@ -27,6 +27,8 @@ READERS = {
     ".glb": "gltf",
     ".gltf": "gltf",
     ".dae": "collada",
+    ".world": "sdf",
+    ".sdf": "sdf",
     ".pcd": "pcd",
     ".xyz": "xyz",
     ".pts": "xyz",

@@ -6,6 +6,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from uavexp.arrays import Float, Int
 from uavexp.errors import WorldError
@@ -89,20 +90,10 @@ def _matrix(library: Library, node: Element) -> Float:
         elif child.tag == "scale":
             matrix[:3, :3] = np.diag(values)
         else:
-            matrix[:3, :3] = _turn(values[:3], np.deg2rad(values[3]))
+            axis = values[:3] / max(float(np.linalg.norm(values[:3])), np.finfo(float).tiny)
+            matrix[:3, :3] = Rotation.from_rotvec(values[3] * axis, degrees=True).as_matrix()
         product = product @ matrix
     return product
-
-
-def _turn(axis: Float, angle_rad: float) -> Float:
-    """Rotation (3, 3) about an axis of any length (Rodrigues)."""
-    length = float(np.linalg.norm(axis))
-    if length == 0.0:
-        return np.eye(3)
-    x, y, z = axis / length
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    turn: Float = np.eye(3) + np.sin(angle_rad) * cross + (1.0 - np.cos(angle_rad)) * cross @ cross
-    return turn
 
 
 def _controlled(library: Library, instance: Element) -> Element:

@@ -40,12 +40,7 @@ class Library:
 
     def numbers(self, text: str, count: int | None = None) -> Float:
         """Return the numbers (N,) of a text; raise `WorldError` unless there are so many."""
-        values = numbers(self.path, text.encode("ascii", "replace"))
-        if count is not None and values.size != count:
-            raise WorldError(
-                f"world file {self.path} is damaged or truncated: {count} numbers needed, {values.size} found"
-            )
-        return values
+        return numbers(self.path, text, count)
 
     def integer(self, item: Element, attribute: str, default: int) -> int:
         """Return the whole number of an attribute; raise `WorldError` when it is none."""

@@ -13,22 +13,29 @@ from uavexp.errors import WorldError
 SHOWN = 60  # characters of a file that an error quotes
 
 
-def numbers(path: Path, text: bytes) -> Float:
+def numbers(path: Path, text: bytes | str, count: int | None = None) -> Float:
     """Return the numbers (N,) of a text of nothing but numbers between blanks.
 
     Raises:
-        WorldError: it holds something else.
+        WorldError: it holds something else, or not so many.
     """
-    if not text.strip():  # numpy makes -1 of blanks alone
-        return np.empty(0)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", DeprecationWarning)  # numpy's word for a text not read to its end
-        try:
-            return np.fromstring(text, dtype=np.float64, sep=" ")
-        except (ValueError, DeprecationWarning) as error:
-            raise WorldError(
-                f"world file {path} is damaged: where numbers belong it holds {_other(text)}"
-            ) from error
+    if isinstance(text, str):
+        text = text.encode("ascii", "replace")
+    values = np.empty(0)
+    if text.strip():  # numpy makes -1 of blanks alone
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", DeprecationWarning)  # numpy's word for a text not read to its end
+            try:
+                values = np.fromstring(text, dtype=np.float64, sep=" ")
+            except (ValueError, DeprecationWarning) as error:
+                raise WorldError(
+                    f"world file {path} is damaged: where numbers belong it holds {_other(text)}"
+                ) from error
+    if count is not None and values.size != count:
+        raise WorldError(
+            f"world file {path} is damaged or truncated: {count} numbers needed, {values.size} found"
+        )
+    return values
 
 
 def integers(path: Path, values: Float) -> np.ndarray[tuple[int], np.dtype[np.int64]]:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from xml.etree import ElementTree
 
 from uavexp.errors import WorldError, one_line
 
 MAX_DEPTH = 200  # of elements in elements
+
+
+_NO_VALUE = re.compile(rb"(<\w[^<>]*?\s\w+)=(?=\s*/?>)")  # an attribute, which Gazebo's own parser lets pass
 
 
 def parse(path: Path) -> ElementTree.Element:
@@ -17,12 +21,20 @@ def parse(path: Path) -> ElementTree.Element:
         WorldError: it is no whole XML, or declares a document type, whose entities can
             grow without bound or name other files.
     """
-    parser = ElementTree.XMLParser(target=_Builder(path))
+    text = path.read_bytes()
     try:
-        parser.feed(path.read_bytes())
-        root: ElementTree.Element = parser.close()
+        try:
+            return _root(path, text)
+        except ElementTree.ParseError:
+            return _root(path, _NO_VALUE.sub(rb'\1=""', text))
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise WorldError(f"world file {path} is damaged or truncated: no XML, {one_line(error)}") from error
+
+
+def _root(path: Path, text: bytes) -> ElementTree.Element:
+    parser = ElementTree.XMLParser(target=_Builder(path))
+    parser.feed(text)
+    root: ElementTree.Element = parser.close()
     return root
 
 
