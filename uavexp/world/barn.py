@@ -8,6 +8,7 @@ the task is the same one: a way between them, none over them. A cylinder is an o
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
@@ -16,10 +17,12 @@ from uavexp.arrays import Float, Float32, Int32
 from uavexp.errors import WorldError, require
 from uavexp.parameters import Positive, between, option
 from uavexp.scene import Scene
+from uavexp.space import FREE, OUTSIDE, Space
 from uavexp.types import World
 from uavexp.world import barn_layouts as published
 from uavexp.world import task
 from uavexp.world.boxes import WALL_M, Boxes
+from uavexp.world.solidity import space_of_mesh
 
 INSET_M = np.array([0.3, 0.3, 0.4])  # of the flight bounds from the field's edges, floor and ceiling
 MAP_MARGIN_M = 0.6  # of the mapped box around the flight bounds
@@ -69,6 +72,7 @@ class Barn:
             bounds_m=flight_bounds + np.array([[-MAP_MARGIN_M], [MAP_MARGIN_M]]),
             flight_bounds_m=flight_bounds,
             path_m=path,
+            space=_all_inside(space_of_mesh(vertices, triangles)),
         )
 
     def _geometry(self, centres_m: Float) -> tuple[Float32, Int32]:
@@ -84,6 +88,11 @@ class Barn:
         vertices, triangles = plates.mesh()
         more, faces = _prisms(centres_m, 0.5 * published.DIAMETER_M, self.height_m)
         return np.concatenate([vertices, more]), np.concatenate([triangles, faces + len(vertices)])
+
+
+def _all_inside(space: Space) -> Space:
+    """The same space, with no outside: the field is open, the ground behind it as good as that in it."""
+    return replace(space, state=np.where(space.state == OUTSIDE, FREE, space.state))
 
 
 def _prisms(centres_m: Float, radius_m: float, height_m: float) -> tuple[Float32, Int32]:

@@ -66,6 +66,15 @@ def test_a_cylinder_is_round_to_six_millimetres_and_reaches_from_floor_to_ceilin
     assert gap.max() < 0.0063
 
 
+def test_all_air_is_inside_and_cylinders_are_not() -> None:
+    world = Barn(number=250).generate(np.random.default_rng(0))
+    ends = np.stack([world.start_m, world.target_m])
+    assert world.space.is_inside(ends).all()
+    assert world.space.is_inside(world.shortest_path).all()
+    centres = np.column_stack([layout(250).centres_m, np.full(len(layout(250).centres_m), 1.2)])
+    assert not world.space.is_inside(centres).any()
+
+
 @needs_barn
 @pytest.mark.parametrize("number", [8, 60, 252])
 def test_the_bottleneck_is_that_of_the_published_map(number: int) -> None:
