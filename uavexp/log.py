@@ -60,7 +60,7 @@ class Steps:
     estimated_position_m: Float  # (T, 3)
     reference_position_m: Float  # (T, 3)
     reference_acceleration_mps2: Float  # (T, 3)
-    clearance_m: Float  # (T,) true distance of the body centre to the nearest surface
+    clearance_m: Float  # (T,) true distance of the body centre to the nearest surface; < 0 inside of a solid
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy import ndimage
 
 from uavexp.arrays import Float
 from uavexp.bodies import distance_m
@@ -37,7 +36,6 @@ from uavexp.types import (
     Reference,
     State,
     Tracks,
-    World,
 )
 
 _COLUMNS = 19
@@ -163,7 +161,7 @@ class Recorder:
         mapped = np.flatnonzero(field.state == OCCUPIED)
         rows = self.rows[: last_step + 1]
         position_m = rows[:, _POSITION]
-        fixed_m, mover_m = scene.fixed_distance_m(position_m), _mover_distance_m(position_m, self._bodies)
+        fixed_m, mover_m = scene.fixed_clearance_m(position_m), _mover_distance_m(position_m, self._bodies)
         return TrialLog(
             outcome=outcome,
             reason=reason,
@@ -172,7 +170,7 @@ class Recorder:
             ticks=_tick_rows(self._ticks),
             replans=replans,
             dropped_triggers=dropped_triggers,
-            contacts=contacts,
+            contacts=(*contacts, *_inside_solids(fixed_m, position_m, contacts, self._step_s)),
             goals_m=np.array(self._goals_m).reshape(-1, 3),
             seen_share=seen_share,
             mapped_m=field.voxel_centres_m(mapped).astype(np.float32),
@@ -246,6 +244,26 @@ def _first_plan(plan: PlanResult | None) -> FirstPlan:
     )
 
 
+def _inside_solids(
+    clearance_m: Float, position_m: Float, contacts: Sequence[Contact], step_s: float
+) -> list[Contact]:
+    """Stretches of rows spent inside of a solid without a surface being met: contacts like any other.
+
+    Args:
+        clearance_m: (T,) to fixed surfaces, negative inside.
+        position_m: (T, 3).
+        contacts: met with surfaces and movers; a stretch during one with a surface is that one.
+        step_s: between rows.
+    """
+    rows = np.flatnonzero(clearance_m < 0.0)
+    found = []
+    for run in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1) if rows.size else []:
+        start_s, end_s = step_s * int(run[0]), step_s * int(run[-1])
+        if not any(item.mover < 0 and item.start_s <= end_s and start_s <= item.end_s for item in contacts):
+            found.append(Contact(start_s=start_s, end_s=end_s, position_m=position_m[run[0]].copy()))
+    return found
+
+
 def _mover_distance_m(position_m: Float, bodies: Sequence[Bodies]) -> Float:
     """Distance (T,) of the body's centre to the nearest mover, step by step; empty without movers."""
     if not bodies:
@@ -259,23 +277,3 @@ def remaining_clearance_m(observation: Observation) -> float:
     if trajectory is None or now_s >= trajectory.end_s:
         return math.nan
     return float(clearance_ahead_m(trajectory, observation.field, now_s).min())
-
-
-def seen_share(
-    world: World, scene: Scene, field: DistanceField, limits: Limits, cell_m: float = 0.25
-) -> float:
-    """Observed share of the reachable volume, 0 to 1.
-
-    Reachable: cells of the flight bounds whose true clearance exceeds the body's radius,
-    face-connected to the start.
-    """
-    low, high = world.flight_bounds_m
-    axes = [np.arange(low[axis] + 0.5 * cell_m, high[axis], cell_m) for axis in range(3)]
-    cells_m = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    clear = scene.distance_m(cells_m.reshape(-1, 3)).reshape(cells_m.shape[:3]) > limits.body_radius_m
-    label, _ = ndimage.label(clear)
-    start = np.unravel_index(
-        np.argmin(np.where(clear, np.linalg.norm(cells_m - world.start_m, axis=-1), np.inf)), clear.shape
-    )
-    reachable = label == label[start]
-    return float(field.observed(cells_m[reachable]).mean())

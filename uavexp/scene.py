@@ -15,6 +15,7 @@ from uavexp import triangle_grid
 from uavexp.arrays import Float, Float32, Int, Int32
 from uavexp.bodies import cast_rays, distance_m, touching
 from uavexp.o3d import open3d
+from uavexp.space import Space
 from uavexp.types import Bodies, World
 
 _THREADS = 1  # records must not depend on the machine
@@ -27,10 +28,11 @@ class Scene:
         world: its `vertices_m` and `triangles`; none at all means empty space.
     """
 
-    __slots__ = ("_grid", "_raycasting", "bodies", "triangles", "vertices_m")
+    __slots__ = ("_grid", "_raycasting", "bodies", "space", "triangles", "vertices_m")
 
     def __init__(self, world: World) -> None:
         self._build(world.vertices_m, world.triangles)
+        self.space = world.space
 
     @classmethod
     def from_mesh(cls, vertices_m: Float32, triangles: Int32) -> Scene:
@@ -45,6 +47,7 @@ class Scene:
         self._grid: triangle_grid.TriangleGrid | None = None
         self._raycasting = None
         self.bodies = Bodies.none()
+        self.space = Space.all_free()
         if self.triangles.shape[0] > 0:
             self._raycasting = open3d.t.geometry.RaycastingScene(nthreads=_THREADS)
             self._raycasting.add_triangles(
@@ -95,6 +98,11 @@ class Scene:
         distance = self._raycasting.compute_distance(_tensor(points_m), nthreads=_THREADS)
         return cast(Float, distance.numpy().astype(np.float64))
 
+    def fixed_clearance_m(self, points_m: Float) -> Float:
+        """The same with its sign: negative (N,) inside of a solid, or of what counts as one."""
+        distance_m = self.fixed_distance_m(points_m)
+        return np.where(self.space.is_solid(points_m), -distance_m, distance_m)
+
     def fixed_closest_point_m(self, points_m: Float) -> Float:
         """Nearest point (N, 3) on a fixed surface of points (N, 3), m; inf in empty space."""
         if self._raycasting is None:
@@ -105,7 +113,8 @@ class Scene:
     def touches(self, position_m: Float, rotation: Float, size_m: Float, margin_m: float = 0.0) -> bool:
         """Whether an oriented box meets a surface or a mover, exactly.
 
-        A box wholly inside a fixed solid meets no surface; one inside a mover does meet it.
+        A box wholly inside a fixed solid meets no surface (`fixed_clearance_m` tells); one inside a
+        mover does meet it.
 
         Args:
             position_m: centre of the box (3,).

@@ -27,10 +27,11 @@ from uavexp.movers.base import Movers
 from uavexp.parameters import NonNegative, Positive, Whole, between, option
 from uavexp.pilot.base import Crew, Pilot
 from uavexp.planner.base import Planner
-from uavexp.recorder import Recorder, Stopwatch, seen_share
+from uavexp.recorder import Recorder, Stopwatch
 from uavexp.safety.base import Safety
 from uavexp.scene import Scene
 from uavexp.seeding import Stream, generator, only_seeded_draws
+from uavexp.seen_share import seen_share
 from uavexp.sensor.base import Sensor
 from uavexp.trigger.base import TriggerPolicy
 from uavexp.types import Limits, MapUpdate, Observation, Outcome, Reference, State, Tracks, World

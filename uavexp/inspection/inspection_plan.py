@@ -18,6 +18,7 @@ from uavexp.inspection.travel import is_reachable, travel_lengths, travel_matrix
 from uavexp.inspection.travel_lattice import Lattice, lattice_of
 from uavexp.inspection.viewpoints import Pattern, Viewpoints, added, needed, pattern_of
 from uavexp.inspection.visibility import Camera, Grid, Views, seen_by, views_of, witnesses
+from uavexp.space import UNMEASURED, Space
 
 EYE_SPACING = 2  # of the places tried for coverable cells, in cells of the lattice
 
@@ -111,6 +112,7 @@ def plan_inspection(
     start_m: Float,
     flight_bounds_m: Float,
     settings: Settings | None = None,
+    space: Space | None = None,
 ) -> InspectionPlan:
     """Plan the inspection of a reference map.
 
@@ -121,8 +123,9 @@ def plan_inspection(
         start_m: (3,) position of the vehicle.
         flight_bounds_m: (2, 3).
         settings: parameters.
+        space: nothing is looked at from where it was never measured.
     """
-    settings = settings or Settings()
+    settings, space = settings or Settings(), space or Space.all_free()
     targets = upright(surface, settings.max_tilt_rad)
     segments = segments_of(targets, settings.growing)
     lattice = lattice_of(
@@ -130,11 +133,13 @@ def plan_inspection(
     )
     grid = Grid(field_.state, field_.origin_m, field_.voxel_size_m)
     eyes = sparse_places(lattice)
+    eyes = eyes[space.state_at(eyes) != UNMEASURED]
     witness = witnesses(grid, camera.optics, eyes, targets.point_m, targets.normal)
 
     def fits(points_m: Float) -> Bool:
         inside = ((points_m >= flight_bounds_m[0]) & (points_m <= flight_bounds_m[1])).all(axis=1)
-        return np.asarray(inside & is_reachable(lattice, points_m))
+        measured = space.state_at(points_m) != UNMEASURED
+        return np.asarray(inside & measured & is_reachable(lattice, points_m))
 
     viewpoints = pattern_of(segments, camera, settings.pattern, flight_bounds_m, fits)
     views = _views(grid, camera, viewpoints, targets)

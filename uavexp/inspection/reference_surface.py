@@ -22,6 +22,8 @@ from uavexp.inspection.visibility import OCCUPIED
 from uavexp.mapping.esdf import SignedDistance
 from uavexp.triangle_grid import box_meets_triangle
 
+_ROUNDING = 1e-4  # of a voxel: more than float32 corners are off, or a surface on a border is lost
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Surface:
@@ -167,15 +169,15 @@ def _corners(vertices_m: Float32, triangles: Int32) -> Float:
 
 @nb.njit(cache=True)
 def _fill(corners: Float, origin: Float, voxel: float, state: UInt8) -> None:
-    """Mark the voxels that a triangle touches as occupied."""
+    """Mark the voxels that a triangle touches as occupied; on a border between two, both."""
     identity = np.eye(3)
-    half = np.full(3, 0.5 * voxel)
+    half = np.full(3, (0.5 + _ROUNDING) * voxel)
     low, high = np.empty(3, dtype=np.int64), np.empty(3, dtype=np.int64)
     for f in range(corners.shape[0]):
         for axis in range(3):
             least, most = corners[f, :, axis].min(), corners[f, :, axis].max()
-            low[axis] = int(max(np.floor((least - origin[axis]) / voxel), 0))
-            high[axis] = int(min(np.floor((most - origin[axis]) / voxel), state.shape[axis] - 1))
+            low[axis] = int(max(np.floor((least - origin[axis]) / voxel - _ROUNDING), 0))
+            high[axis] = int(min(np.floor((most - origin[axis]) / voxel + _ROUNDING), state.shape[axis] - 1))
         for i in range(low[0], high[0] + 1):
             for j in range(low[1], high[1] + 1):
                 for k in range(low[2], high[2] + 1):

@@ -69,7 +69,7 @@ def sampled(flight: Flight) -> Sampled | None:
         position_m=position_m,
         speed_mps=np.linalg.norm(velocity_mps, axis=1),
         acceleration_mps2=np.linalg.norm(acceleration_mps2, axis=1),
-        clearance_m=Scene(flight.world).fixed_distance_m(position_m),
+        clearance_m=Scene(flight.world).fixed_clearance_m(position_m),
     )
 
 

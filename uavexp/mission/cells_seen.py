@@ -63,8 +63,9 @@ def is_met(scene: Scene, eye_m: Float, point_m: Float, normal: Float, tolerance_
 
 
 def reachable_m(field: DistanceField, world: World, clearance_m: float) -> Float:
-    """Places (E, 3) that the vehicle can reach from the start by a map of the world, 0.4 m apart."""
-    return sparse_places(lattice_of(field, world.flight_bounds_m, world.start_m, clearance_m))
+    """Free places (E, 3) that the vehicle can reach from the start by a map of the world, 0.4 m apart."""
+    places_m = sparse_places(lattice_of(field, world.flight_bounds_m, world.start_m, clearance_m))
+    return places_m[world.space.is_free(places_m)]
 
 
 def visible_anywhere(

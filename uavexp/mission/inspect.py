@@ -133,6 +133,8 @@ class Inspect:
         world = unforeseen.with_blocks(
             world, self.blocks, self.block_width_m, self.block_height_m, self.clearance_m, rng
         )
+        if self.blocks or self.gone_share > 0.0:
+            world = unforeseen.with_space(world)
         return unforeseen.with_reference(world, known)
 
     def reset(self, world: World, scene: Scene, limits: Limits) -> None:
@@ -240,7 +242,9 @@ class Inspect:
         settings, start_m = self._settings(), world.start_m
         map_ = reference_field(vertices, triangles, world.bounds_m)
         surface = surface_of_mesh(vertices, target, map_, start_m, self.cell_m)
-        plan = plan_inspection(surface, map_, self._camera(), start_m, world.flight_bounds_m, settings)
+        plan = plan_inspection(
+            surface, map_, self._camera(), start_m, world.flight_bounds_m, settings, world.space
+        )
         return plan if self.tour is Tour.LIN_KERNIGHAN else visited_by_nearest(plan, settings)
 
     def _camera(self) -> Camera:

@@ -17,6 +17,7 @@ from uavexp.scene import Scene
 from uavexp.types import ReferenceMap, World
 from uavexp.world import task
 from uavexp.world.boxes import Boxes
+from uavexp.world.solidity import space_after
 
 ATTEMPTS = 60  # drawings of a block before giving up
 KEEP_M = 1.2  # between a block and the start
@@ -98,7 +99,7 @@ def _joined_layer(scene: Scene, world: World, clearance_m: float) -> tuple[Float
     if len(points) == 0:
         return points, np.zeros(0, dtype=np.bool_)
     nearest = int(np.argmin(np.linalg.norm(points - world.start_m, axis=1)))
-    return points, part == part[nearest]
+    return points, (part == part[nearest]) & world.space.is_free(points)
 
 
 def _still_joined(before_m: Float, scene: Scene, world: World, clearance_m: float) -> bool:
@@ -162,6 +163,12 @@ def with_mesh(world: World, mesh: Mesh) -> World:
         digest.update(str(array.shape).encode())
         digest.update(np.ascontiguousarray(array).tobytes())
     return dataclasses.replace(world, vertices_m=mesh[0], triangles=mesh[1], digest=digest.hexdigest())
+
+
+def with_space(world: World) -> World:
+    """The world with the space of its geometry as it is by now; what was never measured stays so."""
+    space = space_after(world.space, world.vertices_m, world.triangles, world.start_m)
+    return dataclasses.replace(world, space=space)
 
 
 def _merged(first: Mesh, second: Mesh) -> Mesh:

@@ -23,6 +23,7 @@ without orientation.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from scipy import ndimage
@@ -42,17 +43,21 @@ BODY_M = 0.2  # where the body's centre fits is this far from any surface
 ROOM_M = 0.35  # where a body has room its centre is this far from any surface
 _PLACES = 5  # of a part at which winding numbers are asked
 _TURN_OFF = 0.25  # by which a difference of winding numbers may miss a whole one
+_CUT_OUT = 0.05  # share of a rock that the rooms in it take at least
 _REACH = 3  # cells that belong to the part around which they lie
 _NEIGHBOURS = 2000  # places of the main part among which the nearest one is looked for
 
 
-def space_of_mesh(vertices_m: Float32, triangles: Int32, bounds_m: Float | None = None) -> Space:
+def space_of_mesh(
+    vertices_m: Float32, triangles: Int32, bounds_m: Float | None = None, inside_m: Float | None = None
+) -> Space:
     """Space of a mesh.
 
     Args:
         vertices_m: (V, 3).
         triangles: (F, 3), at least one.
         bounds_m: box (2, 3) of a part of a building that is too large; None: all of it.
+        inside_m: a place (3,) in the main part; None: it is told by its size.
     """
     corners = vertices_m[triangles].reshape(-1, 3)
     box = np.stack([corners.min(axis=0), corners.max(axis=0)]).astype(np.float64)
@@ -67,8 +72,27 @@ def space_of_mesh(vertices_m: Float32, triangles: Int32, bounds_m: Float | None 
     def winding(places: Int) -> Float:
         return np.asarray(winding_numbers(vertices_m, triangles, low + (places + 0.5) * cell_m))
 
-    state = np.where(surface, np.uint8(SURFACE), _air(surface, cell_m, winding))
+    known = None if inside_m is None else np.clip(((inside_m - low) / cell_m).astype(np.int64), 0, shape - 1)
+    state = np.where(surface, np.uint8(SURFACE), _air(surface, cell_m, winding, known))
     return Space(state=state, low_m=low, cell_m=np.full(3, cell_m))
+
+
+def space_after(before: Space, vertices_m: Float32, triangles: Int32, inside_m: Float) -> Space:
+    """Space of a building whose surfaces have changed; what was never measured before stays so.
+
+    Args:
+        before: its space until then.
+        vertices_m: (V, 3).
+        triangles: (F, 3).
+        inside_m: a place (3,) in the main part.
+    """
+    after = space_of_mesh(vertices_m, triangles, inside_m=inside_m)
+    if (before.state == UNMEASURED).any():
+        j, k = (item.ravel() for item in np.indices(after.state.shape[1:]))
+        for i, layer in enumerate(after.state):
+            centres = after.low_m + (np.column_stack([np.full(j.size, i), j, k]) + 0.5) * after.cell_m
+            layer[before.state_at(centres).reshape(layer.shape) == UNMEASURED] = UNMEASURED
+    return replace(after, unmeasured_is_solid=before.unmeasured_is_solid)
 
 
 def space_of_points(occupied: Bool, low_m: Float, cell_m: float) -> Space:
@@ -108,8 +132,17 @@ def _margin(cell_m: float) -> int:
     return int(np.ceil(BODY_M / cell_m)) + 1
 
 
-def _air(blocked: Bool, cell_m: float, winding: Callable[[Int], Float] | None) -> UInt8:
-    """State (X, Y, Z) of the cells of air, whatever the others get; `winding` is asked for cells (N, 3)."""
+def _air(
+    blocked: Bool, cell_m: float, winding: Callable[[Int], Float] | None, known: Int | None = None
+) -> UInt8:
+    """State (X, Y, Z) of the cells of air, whatever the others get.
+
+    Args:
+        blocked: cells (X, Y, Z) that are not air.
+        cell_m: size of a cell.
+        winding: gives winding numbers at cells (N, 3); None: nothing is oriented.
+        known: a cell (3,) of the main part.
+    """
     inside = enclosed(blocked)
     air, _ = ndimage.label(~blocked)
     state = np.where((air == air[0, 0, 0]) & ~inside, np.uint8(OUTSIDE), np.uint8(FREE))
@@ -117,9 +150,11 @@ def _air(blocked: Bool, cell_m: float, winding: Callable[[Int], Float] | None) -
     fits, room = squared >= (BODY_M / cell_m) ** 2, squared >= (ROOM_M / cell_m) ** 2
     part, count = ndimage.label(fits)
     main = int(np.bincount(part[inside & fits], minlength=count + 2)[1:].argmax()) + 1
+    if known is not None and part[tuple(known)]:
+        main = int(part[tuple(known)])
     told = np.zeros(count + 1, dtype=np.bool_)
     if winding is not None:
-        told = _other_side(part, room, main, winding)
+        told = _other_side(part, room, main, winding, may_be_solid=known is None)
     open_ = np.zeros(air.max() + 1, dtype=np.bool_)  # parts of air in which a body has room
     open_[air[room & ~told[part]]] = True
     open_[[air[0, 0, 0], *air[part == main][:1]]] = True
@@ -135,16 +170,20 @@ def _holds(part: Int32, where: Bool, count: int) -> Bool:
     return held
 
 
-def _other_side(part: Int32, room: Bool, main: int, winding: Callable[[Int], Float]) -> Bool:
+def _other_side(
+    part: Int32, room: Bool, main: int, winding: Callable[[Int], Float], *, may_be_solid: bool
+) -> Bool:
     """Which parts (count + 1,) lie on the other side of oriented surfaces than the main one.
 
-    Never the surroundings, which hold cell (0, 0, 0).
+    Never the surroundings, which hold cell (0, 0, 0). Solids have the higher winding number: where much
+    room has a lower one than the main part, that is the rock into which this room is cut.
 
     Args:
         part: number (X, Y, Z) of each cell's part, 0 of none.
         room: cells with room around them, at which winding numbers are asked.
         main: number of the main part.
         winding: of cells (N, 3).
+        may_be_solid: whether the main part may be such a rock.
     """
     told = np.zeros(part.max() + 1, dtype=np.bool_)
     near = np.flatnonzero(room & (part == main))
@@ -159,9 +198,13 @@ def _other_side(part: Int32, room: Bool, main: int, winding: Callable[[Int], Flo
     there = places[order[(first[:, None] + share * counts[:, None]).astype(np.int64)]]
     here = of_main[cKDTree(of_main).query(there)[1]]
     asked = winding(np.concatenate([there, here]).reshape(-1, 3)).reshape(2, -1, _PLACES)
-    turns = np.abs(asked[0] - asked[1])
+    turns = asked[0] - asked[1]
     whole = np.rint(turns)
-    told[names] = ((whole >= 1.0) & (np.abs(turns - whole) <= _TURN_OFF)).all(axis=1)
+    told[names] = ((whole != 0.0) & (np.abs(turns - whole) <= _TURN_OFF)).all(axis=1)
+    lower = told[names] & (whole < 0.0).all(axis=1)
+    if may_be_solid and counts[lower].sum() > _CUT_OUT * len(near):
+        main = int(names[lower][counts[lower].argmax()])
+        return _other_side(part, room, main, winding, may_be_solid=False)
     return told
 
 

@@ -16,7 +16,7 @@ from uavexp.world.facility import Facility
 from uavexp.world.multilevel import Multilevel
 from uavexp.world.random_columns import RandomColumns
 from uavexp.world.rooms import Rooms
-from uavexp.world.solidity import space_of_cells, space_of_mesh, space_of_points
+from uavexp.world.solidity import space_after, space_of_cells, space_of_mesh, space_of_points
 from uavexp.world.tunnel import Tunnel
 from uavexp.world.warehouse import Warehouse
 
@@ -112,6 +112,25 @@ def test_rooms_that_are_not_joined_are_free() -> None:
     for wall in (boxes(((5.0, 0.0, 0.0), (5.2, 6.0, 3.0))), boxes(((5.0, 0.0, 0.0), (5.0001, 6.0, 3.0)))):
         for shell in (boxes(HOUSE), SOLID_WALLS):
             assert states(joined(shell, wall), (2.0, 3.0, 1.2), (6.6, 3.0, 1.2)) == [FREE, FREE]
+
+
+def test_rooms_cut_into_rock_are_free() -> None:
+    rock = boxes(((-14.0, -2.0, -1.0), (12.0, 8.0, 4.0)))
+    cut = joined(rock, turned(boxes(HOUSE, ((-12.0, 2.0, 0.0), (-3.0, 4.0, 2.5))), 24))
+    assert states(cut, IN_ROOM, (-8.0, 3.0, 1.2), (10.0, 3.0, 1.2)) == [FREE, FREE, SOLID]
+
+
+def test_what_changes_leaves_the_unmeasured_unmeasured() -> None:
+    state = np.full((60, 40, 1), UNMEASURED, np.uint8)
+    state[20:30, 15:25] = SOLID
+    state[21:29, 16:24] = FREE
+    before = space_of_cells(state, np.zeros(3), np.array([0.5, 0.5, 2.5]), is_plan=True)
+    room = turned(boxes(((10.5, 8.0, 0.0), (14.5, 12.0, 2.5))), 12)
+    block = boxes(((12.0, 9.0, 0.0), (13.0, 10.0, 1.0)))
+    mesh = joined(boxes(((0.0, 0.0, -0.1), (30.0, 20.0, 2.6))), room, block)
+    after = space_after(before, *mesh, np.array([11.2, 11.0, 1.2]))
+    points = np.array([[11.2, 11.0, 1.2], [12.5, 9.5, 0.5], [5.0, 5.0, 1.2], [10.25, 10.0, 1.2]])
+    assert after.state_at(points).tolist() == [FREE, SOLID, UNMEASURED, SOLID]
 
 
 def test_a_thick_wall_is_solid_and_a_point_near_a_surface_is_at_it() -> None:
