@@ -57,6 +57,8 @@ def imports(file: Path) -> Iterator[str]:
 def part_of(module: str) -> str:
     words = module.split(".")
     part = words[1] if len(words) > 1 else "__init__"
+    if words[-1] == "__main__":  # a command stands above all that it calls
+        return "__main__"
     return "roles" if part in GROUPS and part != "pilot" else part  # the pilot asks other roles
 
 

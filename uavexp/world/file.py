@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -33,6 +34,22 @@ Box = Annotated[
         lambda box: all(low < high for low, high in zip(*box, strict=True)),
     ),
 ]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Survey:
+    """A building as read, and where in it a body can be: all that is known before there is a task."""
+
+    content: formats.Content
+    building: Building
+    flight_bounds_m: Float  # (2, 3)
+    scene: Scene
+    parts: FreeParts
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a person should know of it, a sentence each."""
+        return (*self.building.notes, *notes_of(self.parts))
 
 
 @option
@@ -67,10 +84,40 @@ class File:
 
     def generate(self, rng: np.random.Generator) -> World:
         """Return the world; raise `WorldError` in one line when file or task is unusable."""
-        building = self._building()
-        flight_bounds = self._checked_bounds(building)
+        return self.world_of(self.survey(), rng)
+
+    def survey(self) -> Survey:
+        """Return the building; raise `WorldError` in one line when the file is unusable."""
+        # a reader's lengths are the file's own
+        options = formats.Options(wall_height_m=self.wall_height_m / self.unit_m, layers=self.layers)
+        content = formats.read(Path(self.path), options)
+        building = building_of(content, self._reading())
+        bounds_m = self._checked_bounds(building)
         scene = Scene.from_mesh(building.vertices_m, building.triangles)
-        parts = free_parts(scene, flight_bounds, self.clearance_m, building.space)
+        return Survey(
+            content=content,
+            building=building,
+            flight_bounds_m=bounds_m,
+            scene=scene,
+            parts=free_parts(scene, bounds_m, self.clearance_m, building.space),
+        )
+
+    def _reading(self) -> Reading:
+        bounds_m = None
+        if self.flight_bounds_m is not None:
+            bounds_m = np.array(self.flight_bounds_m) + np.array([[-MAP_MARGIN_M], [MAP_MARGIN_M]])
+        return Reading(
+            frame=Frame(path=self.path, unit_m=self.unit_m, up_axis=self.up_axis),
+            voxel_size_m=self.voxel_size_m,
+            wall_height_m=self.wall_height_m,
+            unmeasured_is_solid=self.unknown == "wall",
+            bounds_m=bounds_m,
+        )
+
+    def world_of(self, survey: Survey, rng: np.random.Generator) -> World:
+        """Return the world with its task, given or drawn; raise `WorldError` when there is none."""
+        building, scene, parts = survey.building, survey.scene, survey.parts
+        flight_bounds = survey.flight_bounds_m
         if self.start_m is not None and self.target_m is not None:
             start, target = (
                 self._checked_end(
@@ -89,24 +136,7 @@ class File:
             flight_bounds_m=flight_bounds,
             path_m=self._path(scene, flight_bounds, start, target),
             space=building.space,
-            notes=(*building.notes, *notes_of(parts)),
-        )
-
-    def _building(self) -> Building:
-        # a reader's lengths are the file's own
-        options = formats.Options(wall_height_m=self.wall_height_m / self.unit_m, layers=self.layers)
-        content = formats.read(Path(self.path), options)
-        return building_of(
-            content,
-            Reading(
-                frame=Frame(path=self.path, unit_m=self.unit_m, up_axis=self.up_axis),
-                voxel_size_m=self.voxel_size_m,
-                wall_height_m=self.wall_height_m,
-                unmeasured_is_solid=self.unknown == "wall",
-                bounds_m=None
-                if self.flight_bounds_m is None
-                else np.array(self.flight_bounds_m) + np.array([[-MAP_MARGIN_M], [MAP_MARGIN_M]]),
-            ),
+            notes=survey.notes,
         )
 
     def _checked_bounds(self, building: Building) -> Float:

@@ -60,6 +60,14 @@ class FreeParts:
         return np.asarray(self.places_m(nearest)[0])
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Part:
+    """A part as people are told of it."""
+
+    floor_m2: float
+    middle_m: Float  # (3,) one of its places, near to its middle
+
+
 def free_parts(scene: Scene, flight_bounds_m: Float, clearance_m: float, space: Space) -> FreeParts:
     """Cut the free space within the flight bounds into parts; 26-connected, each edge with its clearance.
 
@@ -118,24 +126,29 @@ def notes_of(parts: FreeParts) -> list[str]:
     notes = []
     if not parts.enclosed:
         notes.append("no walls enclose a part of it: start and target are drawn from all its free space")
+    told_of = parts_told(parts)
+    if len(told_of) > 1:
+        largest, *others = told_of
+        told = [f"{part.floor_m2:.1f} m² at {text(part.middle_m)}" for part in others[:_TOLD]]
+        verb, noun = ("is", "part") if len(others) == 1 else ("are", "parts")
+        notes.append(
+            f"{len(others)} other free {noun} {verb} not joined with the largest of "
+            f"{largest.floor_m2:.1f} m²: {', '.join(told)}{', ...' if len(others) > _TOLD else ''}"
+        )
+    return notes
+
+
+def parts_told(parts: FreeParts) -> list[Part]:
+    """The parts that are worth telling of: the one with most nodes, then the others, most floor first."""
     columns = np.argwhere((parts.inside & (parts.number > 0)).any(axis=2))
-    if not len(columns):
-        return notes
     area_m2 = np.zeros(parts.number.max() + 1)
     for column in columns:
         stack = parts.number[tuple(column)][parts.inside[tuple(column)]]
         area_m2[np.unique(stack)] += CELL_M**2
-    others = np.flatnonzero(area_m2 >= _TOLD_M2)
-    others = others[others != parts.largest]
-    others = others[np.argsort(-area_m2[others], kind="stable")]
-    if len(others):
-        told = [f"{area_m2[n]:.1f} m² at {text(_middle_m(parts, int(n)))}" for n in others[:_TOLD]]
-        verb, noun = ("is", "part") if len(others) == 1 else ("are", "parts")
-        notes.append(
-            f"{len(others)} other free {noun} {verb} not joined with the largest of "
-            f"{area_m2[parts.largest]:.1f} m²: {', '.join(told)}{', ...' if len(others) > _TOLD else ''}"
-        )
-    return notes
+    told = np.flatnonzero(area_m2 >= _TOLD_M2)
+    told = told[np.argsort(-area_m2[told], kind="stable")]
+    told = told[np.argsort(told != parts.largest, kind="stable")]
+    return [Part(floor_m2=float(area_m2[n]), middle_m=_middle_m(parts, int(n))) for n in told]
 
 
 def _middle_m(parts: FreeParts, number: int) -> Float:
