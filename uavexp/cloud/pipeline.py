@@ -104,7 +104,9 @@ class CloudPipeline:
         voxels = voxelise(kept, self.voxel_size_m)
         obstacle = obstacles(voxels, self.least_voxels)
         if not obstacle.any():
-            raise CloudError(f"no {self.least_voxels} voxels of the cloud hang together")
+            raise CloudError(
+                f"no {self.least_voxels} voxels of {self.voxel_size_m:g} m hang together: larger ones?"
+            )
         sides = np.ptp(voxels.centroid_m[obstacle], axis=0)
         upright = np.array([*(plane.is_vertical for plane in planes), False])
         level = np.array([*(plane.is_horizontal for plane in planes), False])

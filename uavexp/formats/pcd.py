@@ -11,7 +11,7 @@ from uavexp.arrays import Float
 from uavexp.errors import WorldError
 from uavexp.formats import base, lzf
 from uavexp.formats.base import Content, Options
-from uavexp.formats.text import rows
+from uavexp.formats.text import BLANKS, check_last_row, rows
 
 _HEADER = 65536  # bytes in which the header must end
 _TYPES = {"F": (4, 8), "I": (1, 2, 4, 8), "U": (1, 2, 4, 8)}  # bytes of a number of each type
@@ -29,6 +29,7 @@ class Header:
     kinds: tuple[np.dtype[np.generic], ...]  # of x, y, z
     offsets: tuple[int, ...]  # byte of a point
     columns: tuple[int, ...]  # of a row
+    width: int  # words of a row
     point_bytes: int
 
 
@@ -74,6 +75,7 @@ def read_header(path: Path) -> Header:
         kinds=tuple(np.dtype(f"<{types[index].lower()}{sizes[index]}") for index in where),
         offsets=tuple(int(starts[index]) for index in where),
         columns=tuple(int(columns[index]) for index in where),
+        width=int(columns[-1]),
         point_bytes=int(starts[-1]),
     )
 
@@ -124,6 +126,7 @@ def _truncated(path: Path, header: Header, found: int) -> WorldError:
 
 
 def _ascii(path: Path, header: Header) -> Float:
+    check_last_row(path, header.begin, BLANKS, header.width)
     with path.open("rb") as file:
         file.seek(header.begin)
         points = rows(path, file, header.columns)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,10 +10,9 @@ import numpy as np
 from uavexp.errors import WorldError
 from uavexp.formats import base
 from uavexp.formats.base import Content, Options
-from uavexp.formats.text import rows
+from uavexp.formats.text import BLANKS, check_last_row, rows, words_of
 
 _HEAD = 65536  # bytes in which the first point must lie
-_TAIL = 65536  # bytes of the end in which the last row is looked for
 _AXES = ("x", "y", "z")
 
 
@@ -23,7 +21,7 @@ class Layout:
     """How rows of this file are written."""
 
     begin: int  # byte of the first row
-    separator: str  # a letter, or \\s+ for blanks
+    separator: str  # a letter or BLANKS
     decimal: str  # point or comma
     width: int  # words of the first row
     columns: tuple[int, ...]  # of x, y, z
@@ -37,7 +35,7 @@ def read(path: Path, options: Options) -> Content:
     count, as in .pts, where more such blocks may follow; blanks, commas or semicolons separate.
     """
     layout = _layout(path)
-    _check_last_row(path, layout)
+    check_last_row(path, layout.begin, layout.separator, layout.width)
     with path.open("rb") as file:
         file.seek(layout.begin)
         points = rows(
@@ -68,9 +66,9 @@ def _layout(path: Path) -> Layout:
     for line in head[begin:].splitlines(keepends=True):
         text = line.decode("latin-1").strip()
         separator = _separator(text)
-        words = _words(text, separator)
+        words = words_of(text.split("#")[0], separator)
         decimal = "," if separator == ";" and "," in text else "."
-        named = _words(text.lstrip("/# ").replace('"', "").lower(), separator)
+        named = words_of(text.lstrip("/# ").replace('"', "").lower(), separator)
         if all(axis in named for axis in _AXES):
             columns = tuple(named.index(axis) for axis in _AXES)
         elif not text or text.startswith(("#", "//")):
@@ -93,11 +91,7 @@ def _layout(path: Path) -> Layout:
 
 
 def _separator(text: str) -> str:
-    return next((letter for letter in ";," if letter in text), r"\s+")
-
-
-def _words(text: str, separator: str) -> list[str]:
-    return re.split(separator, text) if separator != r"\s+" else text.split()
+    return next((letter for letter in ";," if letter in text), BLANKS)
 
 
 def _is_number(word: str) -> bool:
@@ -106,16 +100,3 @@ def _is_number(word: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _check_last_row(path: Path, layout: Layout) -> None:
-    """Raise `WorldError` when the last row has fewer words than the first."""
-    with path.open("rb") as file:
-        file.seek(max(layout.begin, path.stat().st_size - _TAIL))
-        lines = [line.split(b"#")[0].strip() for line in file.read().splitlines()]
-    last = next((line for line in reversed(lines) if line), b"").decode("latin-1")
-    if len(_words(last, layout.separator)) < layout.width:
-        raise WorldError(
-            f"world file {path} is truncated: its last row has fewer numbers than the first one's "
-            f"{layout.width}"
-        )

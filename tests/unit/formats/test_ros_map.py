@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
@@ -175,6 +175,7 @@ def test_published_maps_have_as_many_cells_as_pillow_counts_pixels(path: Path) -
         assert np.count_nonzero(content.cells.state == SOLID) == np.count_nonzero(grey < 255 * 0.35)
 
 
+@settings(max_examples=50, deadline=None)
 @given(
     place=st.integers(0, 200), byte=st.integers(0, 255), kind=st.sampled_from(["pgm", "png", "bmp", "yaml"])
 )
