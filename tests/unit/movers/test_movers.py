@@ -287,7 +287,7 @@ def test_bad_tracks_are_refused_with_file_and_line(tmp_path, room, lines, says):
 
 
 def test_bad_files_and_missing_people_are_refused(tmp_path, room):
-    with pytest.raises(WorldError, match="y_m or y missing"):
+    with pytest.raises(WorldError, match="y_m missing"):
         begin(Recorded(path=recording(tmp_path, "0,a,0", header="t_s,id,x_m")), room)
     with pytest.raises(WorldError, match="cannot be read"):
         begin(Recorded(path=str(tmp_path / "none.csv")), room)

@@ -106,6 +106,11 @@ def as_pedpy(file: Path, scale: float = 1.0, unit: str = "m") -> None:
     file.write_text(head + rows + "\n")
 
 
+def as_social_gan(file: Path) -> None:
+    rows = WALK[["frame", "id", "x", "y"]].to_csv(index=False, header=False, sep="\t")
+    file.write_text("# frame id x y\n" + rows)
+
+
 def as_obsmat(file: Path) -> None:
     table = WALK.assign(z=0.0, vx=0.0, vz=0.0, vy=0.0)[["frame", "id", "x", "z", "y", "vx", "vz", "vy"]]
     np.savetxt(file, table.to_numpy(), fmt="%.7e")
@@ -113,6 +118,7 @@ def as_obsmat(file: Path) -> None:
 
 def as_trajnet(file: Path) -> None:
     lines = [{"scene": {"id": 0, "p": 2, "s": 6, "e": 30, "fps": 2.5, "tag": 2}}]
+    lines += [{"scene": {"id": 1, "p": 7, "s": 6, "e": 30, "fps": 2.5}}]
     lines += [{"track": {"f": r.frame, "p": r.id, "x": r.x, "y": r.y}} for r in WALK.itertuples()]
     lines += [{"track": {"f": 36, "p": 2, "x": 9.0, "y": 9.0, "prediction_number": 0, "scene_id": 0}}]
     file.write_text("\n".join(map(json.dumps, lines)) + "\n")
@@ -143,6 +149,8 @@ FORMS: dict[str, tuple[str, Callable[[Path], None], Options]] = {
     "pedpy": ("txt", as_pedpy, Options()),
     "pedpy in cm": ("txt", lambda f: as_pedpy(f, 100.0, "cm"), Options()),
     "pedpy, overruled": ("txt", lambda f: as_pedpy(f, 1000.0), Options(unit_m=0.001, frame_rate_hz=15.0)),
+    "other columns": ("txt", as_social_gan, Options(frame_rate_hz=15.0)),
+    "table with another suffix": ("txt", as_csv, Options()),
     "obsmat": ("txt", as_obsmat, Options(frame_rate_hz=15.0)),
     "trajnet": ("ndjson", as_trajnet, Options()),
     "jupedsim 1": ("sqlite", as_jupedsim, Options()),
@@ -185,7 +193,8 @@ def test_rows_in_any_order_comments_and_any_case_change_nothing(tmp_path: Path) 
         ("a.csv", "t_s,id,x_m,y_m\n0,1,0,0\n0,1,0,0.1", "a.csv:3: person 1 is at 0 s in another place"),
         ("a.txt", "# framerate: 0\n1 0 0 0", "the frame rate must be 0.001 to 1e6 Hz, got 0"),
         ("a.txt", "# framerate: 25\n1 0 0", "a.txt:2: 4 columns are needed, got 3"),
-        ("a.txt", "1 0 0 0", "does not say how fast"),
+        ("a.txt", "# in m\n1 0 0 0", "does not say how fast"),
+        ("a.txt", "1 0 0 0", "what its columns are is not said; put a line above them: # id frame x y"),
         ("a.ndjson", '{"scene": {"fps": 2.5}}\n{"scene": {"fps": 5}}', "different rates, 2.5, 5 fps"),
         ("a.ndjson", '{"track": {"f": 1, "p": 1, "x": 1}}\n{"scene": {"fps": 5}}', "a.ndjson:1: y must be"),
         ("a.ndjson", "{]", "a.ndjson:1: no JSON"),
@@ -241,6 +250,15 @@ def test_reading_leaves_a_database_and_its_folder_as_they_are(tmp_path: Path) ->
     (tmp_path / "a.sqlite-wal").write_bytes(b"rows that are not in it yet")
     with pytest.raises(WorldError, match="is still being written"):
         read(tmp_path / "a.sqlite")
+
+
+def test_frames_of_two_videos_do_not_change_the_step(tmp_path: Path) -> None:
+    rows = [{"scene": {"fps": 2.5}}]
+    rows += [{"track": {"f": 10 * n + p, "p": p, "x": n, "y": p}} for n in range(4) for p in (0, 3)]
+    (tmp_path / "a.ndjson").write_text("\n".join(map(json.dumps, rows)))
+    tracks = read(tmp_path / "a.ndjson")
+    assert np.diff(tracks["3"][:, 0]) == pytest.approx(0.4)
+    assert tracks["3"][0, 0] == pytest.approx(3 / 25.0)
 
 
 @settings(max_examples=30, deadline=None)

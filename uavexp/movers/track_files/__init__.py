@@ -21,6 +21,7 @@ READERS: dict[str, Callable[[Path], Recording]] = {
     ".txt": columns.read,
     ".ndjson": trajnet.read,
     ".sqlite": jupedsim.read,
+    ".sqlite3": jupedsim.read,
     ".db": jupedsim.read,
 }
 

@@ -1,8 +1,9 @@
 """Bare columns of numbers: trajectories of PedPy, PeTrack and JuPedSim, and `obsmat.txt` of ETH and UCY.
 
-PedPy: `id frame x y [z ...]`, below comments that may tell `# framerate: 25 fps`, the columns, and their unit
+PedPy: `id frame x y [z ...]`, below comments that may tell `# framerate: 25 fps`, other columns, and a unit
 as `x/cm` or `in cm`; m where they do not. Obsmat (Pellegrini et al. 2009): without a comment, eight columns
 `frame id x z y vx vz vy`, in m; the rate of its frames stands nowhere (15 Hz in seq_eth, 25 Hz in seq_hotel).
+A text that begins with the names of its columns is a `table`.
 """
 
 from __future__ import annotations
@@ -11,8 +12,8 @@ import re
 from pathlib import Path
 
 from uavexp.errors import WorldError
+from uavexp.movers.track_files import table
 from uavexp.movers.track_files.base import Recording, Row, number, text_of
-from uavexp.movers.track_files.table import UNITS_M
 
 OBSMAT_COLUMNS = 8
 _PEDPY = {"id": 0, "frame": 1, "x": 2, "y": 3}
@@ -26,25 +27,28 @@ def read(path: Path) -> Recording:
     lines = [(place, line.split()) for place, line in enumerate(text_of(path).splitlines(), start=1)]
     comments = [" ".join(words) for _, words in lines if words and words[0].startswith("#")]
     body = [(place, words) for place, words in lines if words and not words[0].startswith("#")]
-    is_obsmat = not comments and bool(body) and len(body[0][1]) == OBSMAT_COLUMNS
-    column = _OBSMAT if is_obsmat else _named(comments)
+    if body and body[0][1][0][0].isalpha():
+        return table.read(path)
+    column = _columns(path, comments, len(body[0][1]) if body else 0)
     rate = next((found for comment in comments if (found := _RATE.search(comment))), None)
     unit = next((found for comment in comments if (found := _UNIT.search(comment))), None)
     return Recording(
         rows=[_row(path, place, words, column) for place, words in body],
-        unit_m=UNITS_M[(unit[1] or unit[2]).lower()] if unit else 1.0,
+        unit_m=table.UNITS_M[(unit[1] or unit[2]).lower()] if unit else 1.0,
         frame_rate_hz=number(rate[1], "framerate", path, 1) if rate else None,
     )
 
 
-def _named(comments: list[str]) -> dict[str, int]:
-    """Places of the columns, by the comment that names them, else as PedPy has them."""
+def _columns(path: Path, comments: list[str], count: int) -> dict[str, int]:
+    """Places of the columns: by the comment that names them, else as the format has them."""
     for comment in reversed(comments):
         words = [word.split("/")[0].lower() for word in comment.lstrip("# ").split()]
         names = ["frame" if word == "fr" else word for word in words]
         if all(name in names for name in _PEDPY):
             return {name: names.index(name) for name in _PEDPY}
-    return _PEDPY
+    if not comments and count != OBSMAT_COLUMNS:
+        raise WorldError(f"{path}: what its columns are is not said; put a line above them: # id frame x y")
+    return _PEDPY if comments else _OBSMAT
 
 
 def _row(path: Path, place: int, words: list[str], column: dict[str, int]) -> Row:

@@ -1,8 +1,8 @@
 """Tables of people: csv with a header, separated by commas, semicolons or tabs.
 
-Columns are found by name, in any case and order, and others ignored: time `t_s` or `t` in seconds, or
-`frame`; person `id`; place `x_m` and `y_m`, or `x` and `y`. Lines that begin with # are comments; a row of
-units may follow the header; with semicolons numbers may have decimal commas.
+Columns are found by name, in any case and order, and others ignored: time `t_s`, `t`, `time_s` or `time` in
+seconds, or `frame`; person `id`; place `x_m` and `y_m`, or `x` and `y`. Lines that begin with # are
+comments; a row of units may follow the header; with semicolons numbers may have decimal commas.
 """
 
 from __future__ import annotations
@@ -13,7 +13,12 @@ from pathlib import Path
 from uavexp.errors import WorldError
 from uavexp.movers.track_files.base import Recording, Row, text_of
 
-NAMES = {"time": ("t_s", "t", "frame"), "person": ("id",), "x": ("x_m", "x"), "y": ("y_m", "y")}
+NAMES = {
+    "time": ("t_s", "t", "time_s", "time", "frame"),
+    "person": ("id",),
+    "x": ("x_m", "x"),
+    "y": ("y_m", "y"),
+}
 UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 _SEPARATORS = (",", ";", "\t")
 
@@ -52,7 +57,7 @@ def _columns(path: Path, place: int, header: list[str]) -> dict[str, tuple[str, 
         part: next(((name, names.index(name)) for name in known if name in names), None)
         for part, known in NAMES.items()
     }
-    lacking = [" or ".join(NAMES[part]) for part, column in found.items() if column is None]
+    lacking = [NAMES[part][0] for part, column in found.items() if column is None]
     if lacking:
         raise WorldError(
             f"{path}:{place}: columns t_s, id, x_m, y_m are needed, {', '.join(lacking)} missing; there are "
