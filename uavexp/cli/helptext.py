@@ -6,7 +6,7 @@ import ast
 from pathlib import Path
 
 from uavexp.config.experiment import list_experiments, title_of
-from uavexp.config.options import PRESET_GROUP, Option, list_options, read_option
+from uavexp.config.options import PRESET_GROUP, Option, list_options, read_option, text_of
 from uavexp.paths import PACKAGE, conf_folder
 
 USAGE = """\
@@ -98,7 +98,7 @@ def _parameter_lines(option: Option, prefix: str) -> list[str]:
 def _defaults(file: Path) -> dict[str, str]:
     """Default option of each group, from the text of config.yaml."""
     found: dict[str, str] = {}
-    for line in file.read_text(encoding="utf-8").splitlines():
+    for line in text_of(file).splitlines():
         words = line.split("#")[0].strip().removeprefix("- ").split(": ")
         if line.startswith("  - ") and len(words) == 2 and not words[0].startswith("override"):
             found[words[0]] = words[1].strip()

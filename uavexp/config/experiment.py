@@ -30,6 +30,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from uavexp.config.options import text_of
 from uavexp.config.overrides import Setting, expand_grid, flatten, parse_settings, render
 from uavexp.errors import ConfigError, one_line
 from uavexp.parameters import nearest
@@ -70,7 +71,7 @@ def list_experiments(user_folder: Path | None = None) -> dict[str, Path]:
     """
     found: dict[str, Path] = {}
     for folder in (experiments_folder(), *([user_folder / "experiments"] if user_folder else [])):
-        for file in sorted(folder.glob("*/*.yaml")):
+        for file in sorted(filter(Path.is_file, folder.glob("*/*.yaml"))):
             name = f"{file.parent.name}/{file.stem}"
             if name in found:
                 raise ConfigError(f"{file}: experiments={name} exists already; rename yours")
@@ -80,7 +81,7 @@ def list_experiments(user_folder: Path | None = None) -> dict[str, Path]:
 
 def title_of(name: str, file: Path) -> str:
     """Title of an experiment, from its text; nothing else of it is looked at."""
-    match = re.search(r"^title:\s*(.*?)\s*$", file.read_text(encoding="utf-8"), re.MULTILINE)
+    match = re.search(r"^title:\s*(.*?)\s*$", text_of(file), re.MULTILINE)
     return match[1].strip("\"'") if match else name
 
 
@@ -142,6 +143,8 @@ def _load(name: str, file: Path) -> dict[Any, Any]:
     try:
         loaded = OmegaConf.load(file)  # unlike yaml itself, it refuses a key that stands there twice
         tree = OmegaConf.to_container(loaded, resolve=False)
+    except RecursionError as error:
+        raise ConfigError(f"experiments={name} cannot be read: it is too deep, or holds itself") from error
     except (OSError, ValueError, yaml.YAMLError, OmegaConfBaseException) as error:
         raise ConfigError(f"experiments={name} cannot be read: {one_line(error)}") from error
     _check_plain(name, "", tree)

@@ -12,6 +12,7 @@ from uavexp.errors import ConfigError
 PRESET_GROUP = "strategy"  # only overrides other groups; has no component
 EXPERIMENT_GROUP = "experiments"  # files of their own, see `uavexp.config.experiment`
 RUNNER_GROUP = "runner"  # how trials are run: no part of a trial
+_MOST_BYTES = 1_000_000  # of a file, that help looks at
 _PARAMETER = re.compile(r"^(?P<name>[A-Za-z_]\w*):\s*(?P<value>.*?)\s*(?:\s#\s*(?P<comment>.*))?$")
 
 
@@ -49,8 +50,10 @@ def list_options(folders: Sequence[Path]) -> dict[str, dict[str, Path]]:
     """
     found: dict[str, dict[str, Path]] = {}
     for folder in folders:
-        for file in sorted([*folder.glob("*/*.yaml"), *folder.glob("*/*/*.yaml")]):
+        for file in sorted(filter(Path.is_file, [*folder.glob("*/*.yaml"), *folder.glob("*/*/*.yaml")])):
             group = ".".join(file.parent.relative_to(folder).parts)
+            if group.split(".")[0] == EXPERIMENT_GROUP:
+                continue
             options = found.setdefault(group, {})
             if file.stem in options:
                 raise ConfigError(f"{file}: {group}={file.stem} exists already; rename yours")
@@ -58,11 +61,20 @@ def list_options(folders: Sequence[Path]) -> dict[str, dict[str, Path]]:
     return found
 
 
+def text_of(file: Path) -> str:
+    """A configuration's text for people; what is no text in it, whatever its encoding, harms nothing."""
+    try:
+        with file.open("rb") as opened:
+            return opened.read(_MOST_BYTES).decode(errors="replace")
+    except OSError as error:
+        raise ConfigError(f"{file} cannot be read: {error.strerror}") from error
+
+
 def read_option(file: Path) -> Option:
     """Description (leading comment) and parameters of one yaml file."""
     description: list[str] = []
     parameters: list[Parameter] = []
-    for line in file.read_text(encoding="utf-8").splitlines():
+    for line in text_of(file).splitlines():
         match = _PARAMETER.match(line)
         if match is None:
             if line.startswith("#") and not parameters and not line.startswith("# @package"):

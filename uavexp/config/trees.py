@@ -91,6 +91,9 @@ class Trees:
                 warnings.simplefilter("ignore")
                 composed = compose(CONFIG_NAME, overrides=arguments, return_hydra_config=True)
             tree: Any = OmegaConf.to_container(composed, resolve=False)
+        except RecursionError as error:
+            words = "a configuration is too deep, or holds itself"
+            raise ConfigError(f"the configuration does not compose: {words}") from error
         except bad_input as error:
             raise ConfigError(f"the configuration does not compose: {_with_cause(error)}") from error
         return dict(tree)
