@@ -21,9 +21,9 @@ from uavexp.formats.base import Content, Options
 from uavexp.formats.guard import damaged
 
 LINES = ("LINE", "LWPOLYLINE", "POLYLINE", "ARC", "CIRCLE", "ELLIPSE", "SPLINE")
-MOST_ENTITIES = 1_000_000  # blocks unpacked
+MOST_ENTITIES = 500_000  # blocks unpacked
 _DEEPEST = 16  # blocks within blocks
-_SAGITTA = 1e-3  # of a curve's extent, by which its polyline may miss it
+_SAGITTA = 1e-4  # of a curve's extent, by which its polyline may miss it
 _TAIL = 64  # bytes in which a drawing's mark of its end stands
 
 logging.getLogger("ezdxf").addHandler(logging.NullHandler())  # its warnings stay off the terminal
@@ -94,20 +94,20 @@ def _entities(path: Path, entities: Iterable[Any]) -> Iterator[tuple[str, Any]]:
         if entity is None:
             waiting.pop()
             continue
-        seen += 1
+        seen += entity.mcount if entity.dxftype() == "INSERT" else 1
         inherited = waiting[-1][1]
         layer = inherited if entity.dxf.layer == "0" else entity.dxf.layer
+        if seen > MOST_ENTITIES or len(waiting) > _DEEPEST:
+            raise WorldError(
+                f"world file {path} unpacks to more than {MOST_ENTITIES} lines, or blocks within "
+                f"{_DEEPEST} blocks: explode it, or give fewer layers"
+            )
         if entity.dxftype() != "INSERT":
             yield layer, entity
         elif entity.mcount > 1:
             waiting.append((entity.multi_insert(), inherited))
         else:
             waiting.append((entity.virtual_entities(), layer))
-        if seen > MOST_ENTITIES or len(waiting) > _DEEPEST:
-            raise WorldError(
-                f"world file {path} unpacks to more than {MOST_ENTITIES} lines, or blocks within "
-                f"{_DEEPEST} blocks: explode it, or give fewer layers"
-            )
 
 
 def _polyline(path: Path, entity: Any) -> Float | None:
