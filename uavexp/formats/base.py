@@ -38,8 +38,8 @@ class Content:
     triangles: Int32 = field(default_factory=lambda: np.empty((0, 3), dtype=np.int32))  # (F, 3)
     points: Float = field(default_factory=_none)  # (N, 3)
     cells: Cells | None = None
-    unit_m: float | None = None  # of the coordinates, where the file tells
-    up_axis: str | None = None  # x, y or z, where the file or its format tells
+    unit_m: float | None = None  # length of one unit, where the file or its format tells
+    up_axis: str | None = None  # x, y or z, likewise
     warnings: tuple[str, ...] = ()  # what a person should know of it, a sentence each
 
 

@@ -38,13 +38,20 @@ def read(path: Path, options: Options) -> Content:
             shapes[geometry] = list(surfaces(library, geometry, warnings))
         for vertices, triangles in shapes[geometry]:
             parts.add(vertices, triangles, matrix)
-    unit = root.find("asset/unit")
     return parts.content(
         "dae mesh",
         tuple(warnings),
-        unit_m=1.0 if unit is None else float(library.numbers(unit.get("meter", "1"), 1)[0]),
+        unit_m=_unit_m(library, root),
         up_axis=UP_AXES.get(root.findtext("asset/up_axis", "").strip(), "y"),
     )
+
+
+def _unit_m(library: Library, root: Element) -> float:
+    unit = root.find("asset/unit")
+    unit_m = 1.0 if unit is None else float(library.numbers(unit.get("meter", "1"), 1)[0])
+    if not 0.0 < unit_m < np.inf:
+        raise WorldError(f"world file {library.path} is damaged: its unit is {unit_m} m")
+    return unit_m
 
 
 def _placed(library: Library, root: Element, warnings: dict[str, None]) -> list[tuple[Element, Float]]:
@@ -53,7 +60,7 @@ def _placed(library: Library, root: Element, warnings: dict[str, None]) -> list[
     if scene is None:
         return [(geometry, np.eye(4)) for geometry in root.iterfind("library_geometries/geometry")]
     placed, nodes = list[tuple[Element, Float]](), 0
-    todo = [(library.target(scene, "url"), np.eye(4))]
+    todo = [(library.target(scene, "url", "visual_scene"), np.eye(4))]
     while todo:
         node, matrix = todo.pop()
         nodes += 1
@@ -64,9 +71,9 @@ def _placed(library: Library, root: Element, warnings: dict[str, None]) -> list[
             if child.tag == "node":
                 todo.append((child, matrix))
             elif child.tag == "instance_node":
-                todo.append((library.target(child, "url"), matrix))
+                todo.append((library.target(child, "url", "node"), matrix))
             elif child.tag == "instance_geometry":
-                placed.append((library.target(child, "url"), matrix))
+                placed.append((library.target(child, "url", "geometry"), matrix))
             elif child.tag == "instance_controller":
                 warnings["skins and morphs stand as they were modelled, not posed"] = None
                 placed.append((_controlled(library, child), matrix))
@@ -98,7 +105,7 @@ def _matrix(library: Library, node: Element) -> Float:
 
 def _controlled(library: Library, instance: Element) -> Element:
     """The geometry that a controller, or a chain of them, moves."""
-    target = library.target(instance, "url")
+    target = library.target(instance, "url", "controller")
     for _ in range(MAX_NODES):
         if target.tag != "controller":
             return target
@@ -106,5 +113,5 @@ def _controlled(library: Library, instance: Element) -> Element:
         inner = target.find("morph") if inner is None else inner
         if inner is None:
             break
-        target = library.target(inner, "source")
+        target = library.target(inner, "source", "geometry", "controller")
     raise WorldError(f"world file {library.path} is damaged: a controller moves nothing")

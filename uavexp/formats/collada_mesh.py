@@ -27,16 +27,18 @@ class Library:
 
     def __init__(self, path: Path, root: Element) -> None:
         self.path = path
-        self._named = {item.get("id"): item for item in root.iter() if item.get("id")}
+        self._named = {(item.tag, item.get("id")): item for item in root.iter() if item.get("id")}
 
-    def target(self, reference: Element, attribute: str) -> Element:
-        """Return the element that an attribute names; raise `WorldError` when there is none."""
+    def target(self, reference: Element, attribute: str, *tags: str) -> Element:
+        """Return the element of one of these tags that an attribute names; raise `WorldError` without one."""
         name = reference.get(attribute, "")
-        if not name.startswith("#") or name[1:] not in self._named:
-            raise WorldError(
-                f"world file {self.path} is damaged: its {reference.tag} names {name!r}, which it lacks"
-            )
-        return self._named[name[1:]]
+        for tag in tags if name.startswith("#") else ():
+            if (tag, name[1:]) in self._named:
+                return self._named[tag, name[1:]]
+        raise WorldError(
+            f"world file {self.path} is damaged: its {reference.tag} names {name!r}, which is no "
+            f"{' or '.join(tags)} of it"
+        )
 
     def numbers(self, text: str, count: int | None = None) -> Float:
         """Return the numbers (N,) of a text; raise `WorldError` unless there are so many."""
@@ -72,7 +74,7 @@ def _surface(library: Library, item: Element, warnings: dict[str, None]) -> tupl
     step, offset = max(offsets) + 1, offsets[inputs.index(vertex)]
     if min(offsets) < 0:
         raise WorldError(f"world file {library.path} is damaged: an input has the offset {min(offsets)}")
-    vertices = _positions(library, library.target(vertex, "source"))
+    vertices = _positions(library, library.target(vertex, "source", "vertices", "source"))
     if item.find("ph") is not None:
         warnings["holes of polygons were not read"] = None
     runs = [_every(library, text, step, offset) for text in item.iterfind("p")]
@@ -113,9 +115,11 @@ def _positions(library: Library, source: Element) -> Float:
         position = next((item for item in source if item.get("semantic") == "POSITION"), None)
         if position is None:
             raise WorldError(f"world file {library.path} is damaged: its vertices have no POSITION input")
-        source = library.target(position, "source")
+        source = library.target(position, "source", "source")
     accessor = source.find("technique_common/accessor")
-    array = source.find("float_array") if accessor is None else library.target(accessor, "source")
+    array = (
+        source.find("float_array") if accessor is None else library.target(accessor, "source", "float_array")
+    )
     if array is None:
         raise WorldError(f"world file {library.path} is damaged: a source holds no float_array")
     values = library.numbers(array.text or "")

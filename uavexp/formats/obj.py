@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from codecs import BOM_UTF8
 from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
@@ -80,6 +81,8 @@ class _Lines:
 def _pieces(file: BinaryIO) -> Iterator[bytes]:
     """Whole lines of a file, each ended, continued ones joined, without comments."""
     rest = b""
+    if file.read(len(BOM_UTF8)) != BOM_UTF8:
+        file.seek(0)
     while block := file.read(PIECE):
         block = rest + block
         cut = _last_end(block)

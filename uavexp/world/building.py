@@ -29,6 +29,7 @@ class Building:
     triangles: Int32  # (F, 3)
     space: Space
     origin_m: Float  # (3,) taken off all coordinates of the file
+    unit_m: float  # of the file
     notes: tuple[str, ...]
 
 
@@ -72,7 +73,8 @@ def building_of(content: Content, reading: Reading) -> Building:
         triangles=triangles,
         space=space,
         origin_m=origin_m,
-        notes=(*content.warnings, *_notes(cells, reading, origin_m)),
+        unit_m=frame.unit_m,
+        notes=(*content.warnings, *frame.notes(content), *_notes(cells, reading, origin_m)),
     )
 
 

@@ -18,7 +18,7 @@ from uavexp.space import SOLID, UNMEASURED, Space
 from uavexp.types import World
 from uavexp.world import task
 from uavexp.world.building import Building, Reading, building_of
-from uavexp.world.frame import Frame
+from uavexp.world.frame import frame_of
 from uavexp.world.free_parts import FreeParts, floor_m, free_parts, notes_of, text
 
 INSET_M = (0.3, 0.3, 0.4)  # of the flight bounds from the geometry's bounding box, when not given
@@ -56,11 +56,13 @@ class Survey:
 class File:
     """A world read from a file; lengths below are in m in the converted frame, z up."""
 
-    path: Annotated[str, Constraint("the name of a world file", bool)]  # mesh ply obj stl glb; cloud pcd ply
-    # xyz pts npz las laz; voxels npz bt ot 3dmap; plan yaml (ROS) dxf wkt; relative to the working directory
-    unit_m: Positive = 1.0  # m, length of one unit of the file (0.001 for mm, 0.0254 for inches)
-    up_axis: Literal["x", "y", "z", "-x", "-y", "-z"] = "z"  # the file's axis that points up:
-    # x y z -x -y -z (glb: y)
+    path: Annotated[str, Constraint("the name of a world file", bool)]  # mesh ply obj stl glb gltf dae,
+    # Gazebo's world sdf; cloud pcd ply xyz pts npz las laz; voxels npz bt ot 3dmap; plan yaml (ROS) dxf wkt;
+    # relative to the working directory
+    unit_m: Positive | None = None  # m, length of one unit of the file (0.001 for mm, 0.0254 for inches);
+    # null: as it says, or 1 m
+    up_axis: Literal["x", "y", "z", "-x", "-y", "-z"] | None = None  # the file's axis that points up:
+    # x y z -x -y -z; null: as it says (glb: y), or z
     start_m: Vector | None = None  # m, [x, y, z]; null: drawn by the seed from the largest free part inside
     # the building
     target_m: Vector | None = None  # m, [x, y, z]; null exactly when start_m is
@@ -89,9 +91,9 @@ class File:
     def survey(self) -> Survey:
         """Return the building; raise `WorldError` in one line when the file is unusable."""
         # a reader's lengths are the file's own
-        options = formats.Options(wall_height_m=self.wall_height_m / self.unit_m, layers=self.layers)
+        options = formats.Options(wall_height_m=self.wall_height_m / (self.unit_m or 1.0), layers=self.layers)
         content = formats.read(Path(self.path), options)
-        building = building_of(content, self._reading())
+        building = building_of(content, self._reading(content))
         bounds_m = self._checked_bounds(building)
         scene = Scene.from_mesh(building.vertices_m, building.triangles)
         return Survey(
@@ -102,12 +104,12 @@ class File:
             parts=free_parts(scene, bounds_m, self.clearance_m, building.space),
         )
 
-    def _reading(self) -> Reading:
+    def _reading(self, content: formats.Content) -> Reading:
         bounds_m = None
         if self.flight_bounds_m is not None:
             bounds_m = np.array(self.flight_bounds_m) + np.array([[-MAP_MARGIN_M], [MAP_MARGIN_M]])
         return Reading(
-            frame=Frame(path=self.path, unit_m=self.unit_m, up_axis=self.up_axis),
+            frame=frame_of(content, self.path, self.unit_m, self.up_axis),
             voxel_size_m=self.voxel_size_m,
             wall_height_m=self.wall_height_m,
             unmeasured_is_solid=self.unknown == "wall",
@@ -148,7 +150,7 @@ class File:
             if not (bounds[0] < bounds[1]).all():
                 raise WorldError(
                     f"{self.path}: the geometry is {text(box[1] - box[0])} m, too small to fly in; "
-                    f"is world.unit_m={self.unit_m:g} right?"
+                    f"is world.unit_m={building.unit_m:g} right?"
                 )
         else:
             bounds = np.array(self.flight_bounds_m) - building.origin_m

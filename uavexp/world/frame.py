@@ -8,7 +8,7 @@ import numpy as np
 
 from uavexp.arrays import Float
 from uavexp.errors import WorldError
-from uavexp.formats import Cells
+from uavexp.formats import Cells, Content
 
 # rows of the rotation that turns each up axis to +z
 UP_AXES = {
@@ -29,6 +29,19 @@ class Frame:
     path: str  # named in errors
     unit_m: float  # length of one unit of the file
     up_axis: str  # the file's axis that points up, a key of `UP_AXES`
+
+    def notes(self, content: Content) -> list[str]:
+        """Return what a person should know of the unit and axis that the file names."""
+        notes = []
+        for name, said, used, usual in (
+            ("unit_m", content.unit_m, self.unit_m, 1.0),
+            ("up_axis", content.up_axis, self.up_axis, "z"),
+        ):
+            if said is not None and said != used:
+                notes.append(f"read with world.{name}={used}, though the file says {said}")
+            elif said is not None and said != usual:
+                notes.append(f"read with world.{name}={used}, as the file says")
+        return notes
 
     def turned(self, points: Float) -> Float:
         """Points (N, 3) of the file in m, z up."""
@@ -60,6 +73,11 @@ class Frame:
             origin=corners.min(axis=0),
             size=self.unit_m * cells.size[source],
         )
+
+
+def frame_of(content: Content, path: str, unit_m: float | None, up_axis: str | None) -> Frame:
+    """Return the frame that was asked for, else the one that the file names, else metres, z up."""
+    return Frame(path=path, unit_m=unit_m or content.unit_m or 1.0, up_axis=up_axis or content.up_axis or "z")
 
 
 def corners_of(cells: Cells) -> Float:

@@ -7,69 +7,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
+from tests.collada_files import NODE, dae, fans, inputs, polygons, polylist, strips, triangles
 from tests.damage import DAMAGES, check_ends_well, damaged
 from tests.folders import SHARED
-from tests.shaped_meshes import CUBE, QUADS, TRIANGLES, area_and_volume, check_is_cube
+from tests.shaped_meshes import area_and_volume, check_is_cube
 from uavexp import formats
 from uavexp.errors import WorldError
 from uavexp.formats import Content, collada
-
-
-def words(values: np.ndarray) -> str:
-    return " ".join(f"{value:g}" for value in np.ravel(values))
-
-
-def inputs(step: int = 1) -> str:
-    """The vertices' input, and before it others that say nothing of the shape."""
-    others = "".join(f'<input semantic="N" source="#n" offset="{place}"/>' for place in range(step - 1))
-    return f'{others}<input semantic="VERTEX" source="#v" offset="{step - 1}"/>'
-
-
-def between(corners: np.ndarray, step: int) -> str:
-    """Indices of corners, with others of another input before each."""
-    return words(np.column_stack([np.full((corners.size, step - 1), 99), corners.reshape(-1)]))
-
-
-def triangles(step: int = 1) -> str:
-    return f'<triangles count="12">{inputs(step)}<p>{between(TRIANGLES, step)}</p></triangles>'
-
-
-def polylist(step: int = 1) -> str:
-    faces = f"<vcount>{words(np.full(6, 4))}</vcount><p>{between(QUADS, step)}</p>"
-    return f'<polylist count="6">{inputs(step)}{faces}</polylist>'
-
-
-def polygons(step: int = 1) -> str:
-    faces = "".join(f"<p>{between(quad, step)}</p>" for quad in QUADS)
-    return f'<polygons count="6">{inputs(step)}{faces}</polygons>'
-
-
-def strips(step: int = 1) -> str:
-    faces = "".join(f"<p>{between(quad[[0, 1, 3, 2]], step)}</p>" for quad in QUADS)
-    return f'<tristrips count="6">{inputs(step)}{faces}</tristrips>'
-
-
-def fans(step: int = 1) -> str:
-    faces = "".join(f"<p>{between(quad, step)}</p>" for quad in QUADS)
-    return f'<trifans count="6">{inputs(step)}{faces}</trifans>'
-
-
-NODE = '<node><instance_geometry url="#cube"/></node>'
-
-
-def dae(faces: str | None = None, nodes: str = NODE, asset: str = "", libraries: str = "") -> str:
-    return f"""<?xml version="1.0" encoding="utf-8"?>
-<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
-<asset>{asset}</asset>
-<library_images><image id="i"><init_from>nowhere.png</init_from></image></library_images>
-<library_geometries><geometry id="cube"><mesh>
-<source id="p"><float_array id="a" count="24">{words(CUBE)}</float_array>
-<technique_common><accessor source="#a" count="8" stride="3"/></technique_common></source>
-<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
-{triangles() if faces is None else faces}
-</mesh></geometry></library_geometries>{libraries}
-<library_visual_scenes><visual_scene id="s">{nodes}</visual_scene></library_visual_scenes>
-<scene><instance_visual_scene url="#s"/></scene></COLLADA>"""
 
 
 def read(folder: Path, text: str | bytes) -> Content:
@@ -148,10 +92,11 @@ def test_without_a_scene_all_shapes_are_read(tmp_path: Path) -> None:
         ('triangles count="12"', 'triangles count="13"', "promises 13 faces, 12 with 36"),
         ('offset="0"', 'offset="-1"', "offset -1"),
         ('offset="0"', 'offset="4"', "not by 5"),
-        ('source="#v"', 'source="#w"', "names '#w', which it lacks"),
-        ('source="#v"', 'source="w"', "names 'w', which it lacks"),
-        ('url="#s"', 'url="#cube"', "no triangles"),
-        ('url="#s"', 'url="other.dae#s"', "lacks"),
+        ('source="#v"', 'source="#w"', "names '#w', which is no vertices or source of it"),
+        ('source="#v"', 'source="w"', "names 'w', which is no"),
+        ('url="#s"', 'url="#cube"', "which is no visual_scene"),
+        ('url="#s"', 'url="other.dae#s"', "names 'other.dae#s'"),
+        ("<asset>", '<asset><unit meter="0"/>', "its unit is 0.0 m"),
         ('semantic="POSITION"', 'semantic="NORMAL"', "no POSITION"),
         ('semantic="VERTEX"', 'semantic="NORMAL"', "no VERTEX"),
         ("<node>", "<node><lookat>0 0 0 1 0 0 0 0 1</lookat>", "lookat, which is not supported"),

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
+from tests.collada_files import dae
 from tests.damage import DAMAGES, check_ends_well, damaged
 from tests.folders import SHARED
 from tests.shaped_meshes import area_and_volume
-from tests.unit.formats.test_collada import dae
 from tests.unit.formats.test_stl import binary
 from uavexp import formats
 from uavexp.errors import WorldError

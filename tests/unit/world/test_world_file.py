@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.collada_files import dae
 from tests.folders import DATA
 from uavexp.errors import ConfigError, UavexpError, WorldError
 from uavexp.geometry import polyline_length_m
@@ -31,7 +32,7 @@ def read(path: Path | str, seed: int = 0, **parameters: object) -> World:
         ("flat.ply", {}, 1e-5),
         ("flat.obj", {}, 1e-5),
         ("flat.stl", {}, 1e-5),
-        ("flat.glb", {"up_axis": "y"}, 1e-5),
+        ("flat.glb", {}, 1e-5),
         ("flat_map.yaml", {}, 1e-5),
         ("flat.pcd", {"voxel_size_m": 0.2}, 0.1 + 1e-5),  # half a voxel
         ("flat_voxels.npz", {}, 0.1 + 1e-5),
@@ -97,6 +98,22 @@ def test_a_turned_file_in_millimetres_is_the_same_world(tmp_path: Path, axis: st
     turned.write_text("\n".join(lines))
     world = read(turned, unit_m=0.001, up_axis=axis)
     np.testing.assert_allclose(world.vertices_m, read(DATA / "flat.obj").vertices_m, atol=1e-5)
+
+
+def test_unit_and_axis_are_those_that_the_file_names_unless_given(tmp_path: Path) -> None:
+    flat = read(DATA / "flat.obj")
+    corners = 100.0 * flat.vertices_m[flat.triangles] @ np.array(UP_AXES["y"], dtype=float)  # cm, y up
+    text = dae(asset='<unit meter="0.01"/><up_axis>Y_UP</up_axis>', vertices=corners.reshape(-1, 3))
+    (tmp_path / "flat.dae").write_text(text)
+    world = read(tmp_path / "flat.dae")
+    np.testing.assert_allclose(world.vertices_m, flat.vertices_m[flat.triangles].reshape(-1, 3), atol=1e-4)
+    said = "read with world.unit_m=0.01, as the file says", "read with world.up_axis=y, as the file says"
+    assert set(said) <= set(world.notes)
+    (tmp_path / "flat.dae").write_text(text.replace('"0.01"', '"1.0"').replace("Y_UP", "Z_UP"))
+    world = read(tmp_path / "flat.dae", unit_m=0.01, up_axis="y")
+    np.testing.assert_allclose(world.vertices_m, flat.vertices_m[flat.triangles].reshape(-1, 3), atol=1e-4)
+    assert "read with world.unit_m=0.01, though the file says 1.0" in world.notes
+    assert not [note for note in flat.notes if "read with" in note]
 
 
 def test_voxel_faces_enclose_exactly_the_voxels() -> None:
