@@ -34,8 +34,9 @@ POLICY = (MAP, GOAL, CLOCK, DISTANCE, COLLISION, COVERED, EXPIRED, ARRIVAL, RISK
 FIRST = Cause("first", "no plan was flown yet", "#606060", "*")
 RETRY = Cause("retry", "the last request brought no plan", "#606060", "P")
 BRAKE = Cause("brake", "after an emergency stop", "#000000", "v")
-BEHIND = Cause("behind", "the vehicle fell behind", "#D55E00", "s")
-PILOT = (FIRST, RETRY, BRAKE, BEHIND)
+BEHIND = Cause("behind", "the vehicle fell behind", "#D55E00", "v")
+HELD = Cause("held", "the safety held the vehicle", "#0072B2", "s")
+PILOT = (FIRST, RETRY, BRAKE, BEHIND, HELD)
 OTHER = Cause("other", "the pilot's own, counted together", "#606060", "P")
 
 _SPARE = (("#606060", "d"), ("#882255", "H"), ("#0072B2", "8"), ("#D55E00", "d"), ("#009E73", "H"))

@@ -264,7 +264,8 @@ def _begin(parts: Parts, world: World, seed: int) -> _Flight:
     parts.detection.reset(limits, generator(seed, Stream.DETECTION))
     parts.sensor.reset(scene, generator(seed, Stream.SENSOR))
     parts.mapping.reset(world.bounds_m, scene)
-    parts.mapping.mark_free(world.start_m, parts.start_bubble_m)
+    room_m = float(scene.fixed_distance_m(world.start_m[None])[0])  # what is said to be free is
+    parts.mapping.mark_free(world.start_m, min(parts.start_bubble_m, room_m))
     parts.trigger.reset(limits)
     parts.planner.reset(planned, generator(seed, Stream.PLANNER))
     parts.controller.reset(steered, parts.vehicle.mass_kg)
@@ -277,7 +278,7 @@ def _begin(parts: Parts, world: World, seed: int) -> _Flight:
         explorer=guide,
         trigger=parts.trigger,
         planner=parts.planner,
-        must_brake=parts.safety.begin(planned),
+        guard=parts.safety.begin(planned),
         limits=planned,
         latency_s=parts.latency_s,
         start_m=world.start_m.copy(),

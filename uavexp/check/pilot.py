@@ -16,6 +16,7 @@ from uavexp.check.requests import quintic
 from uavexp.field import DistanceField
 from uavexp.pilot.base import Crew, Piloting
 from uavexp.recorder import Stopwatch
+from uavexp.safety.base import Unguarded
 from uavexp.trajectory import Trajectory
 from uavexp.types import Decision, Goal, Observation, PlanRequest, PlanResult, PlanStatus, Reference
 
@@ -28,7 +29,7 @@ _SPARE = 1.01  # of a limit, by which a reference may exceed it between two step
 
 @dataclass(slots=True)
 class _Crew:
-    """Explorer, trigger, planner and safety in one: the target, every `period_s`, by quintics."""
+    """Explorer, trigger, and planner in one: the target, every `period_s`, by quintics."""
 
     period_s: float = np.inf
     refuses: Callable[[float], bool] = lambda time_s: False
@@ -62,10 +63,6 @@ class _Crew:
             return PlanResult(status=PlanStatus.NO_PATH, reason="asked to refuse")
         return PlanResult(status=PlanStatus.OK, trajectory=quintic(request, _SLOW_S))
 
-    def must_brake(self, observation: Observation) -> bool:
-        """Never."""
-        return False
-
 
 def _flown(make: Make, crew: _Crew, duration_s: float = 6.0) -> tuple[Piloting, list[Reference]]:
     """A flight that is tracked exactly: 100 references, 10 ESDF updates and 5 goals a second."""
@@ -74,7 +71,7 @@ def _flown(make: Make, crew: _Crew, duration_s: float = 6.0) -> tuple[Piloting, 
             explorer=crew,
             trigger=crew,
             planner=crew,
-            must_brake=crew.must_brake,
+            guard=Unguarded(),
             limits=LIMITS,
             latency_s=_LATENCY_S,
             start_m=_START_M,

@@ -13,7 +13,7 @@ from uavexp.explorer.base import Explorer
 from uavexp.log import Replan
 from uavexp.planner.base import Planner
 from uavexp.recorder import Stopwatch
-from uavexp.safety.base import MustBrake
+from uavexp.safety.base import Guard
 from uavexp.trajectory import Trajectory
 from uavexp.trigger.base import TriggerPolicy
 from uavexp.types import Goal, Limits, Observation, PlanResult, Reference
@@ -26,7 +26,7 @@ class Crew:
     explorer: Explorer
     trigger: TriggerPolicy
     planner: Planner
-    must_brake: MustBrake
+    guard: Guard
     limits: Limits
     latency_s: float  # from a request to its effect
     start_m: Float  # (3,)
@@ -45,8 +45,14 @@ class Pilot(Protocol):
 class Piloting(Protocol):
     """One trial's pilot at work."""
 
-    trajectory: Trajectory | None  # being flown; None before the first plan
-    goal: Goal | None  # of that trajectory
+    @property
+    def trajectory(self) -> Trajectory | None:
+        """Being flown, with the times at which it is; None before the first plan."""
+
+    @property
+    def goal(self) -> Goal | None:
+        """Of that trajectory."""
+
     best_goal: Goal | None  # the explorer's latest choice g*
     replans: list[Replan]  # every planning request
     dropped_triggers: int

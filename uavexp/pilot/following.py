@@ -13,8 +13,9 @@ import numpy as np
 
 from uavexp.arrays import Float
 from uavexp.geometry import wrap_angle
+from uavexp.pace import evaluate_paced
 from uavexp.pilot.heading import bearing_rad, rate_to
-from uavexp.trajectory import differentiate_pieces, evaluate_pieces
+from uavexp.trajectory import evaluate_pieces
 from uavexp.types import Reference
 
 
@@ -22,6 +23,7 @@ from uavexp.types import Reference
 def follow(
     breaks_s: Float,
     coefficients: Float,
+    pace: tuple[Float, Float, Float],
     times_s: Float,
     moves_s: float,
     lookahead_s: float,
@@ -35,22 +37,21 @@ def follow(
     Args:
         breaks_s: of the `Trajectory`.
         coefficients: of the same.
+        pace: times, own times and rates of the `Pace` at which it is flown.
         times_s: (N,) a step apart, increasing.
         moves_s: before, the trajectory only turns: what lies ahead begins there.
-        lookahead_s: how far ahead the yaw looks.
+        lookahead_s: how far ahead the yaw looks, in the trajectory's own time: where the flight goes,
+            however slowly.
         wanted_rad: the yaw that the goal asks for; NaN: none.
         yaw_rad: before the first step.
         most_radps: fastest turn.
         step_s: of a step.
     """
-    # A plan may be adopted a rounding before it starts, where it would stand still.
-    now_s = np.maximum(times_s, breaks_s[0])
+    now_s, position, velocity, acceleration, jerk = evaluate_paced(breaks_s, coefficients, pace, times_s)
     ahead_s = np.minimum(np.maximum(now_s, moves_s) + lookahead_s, np.maximum(now_s, breaks_s[-1]))
-    position, velocity, acceleration = evaluate_pieces(breaks_s, coefficients, now_s)
     ahead = evaluate_pieces(breaks_s, coefficients, ahead_s)[0] - position
     rows = np.zeros((len(times_s), 14))
-    rows[:, 0:3], rows[:, 3:6], rows[:, 6:9] = position, velocity, acceleration
-    rows[:, 11:14] = differentiate_pieces(breaks_s, coefficients, now_s, 3)
+    rows[:, 0:3], rows[:, 3:6], rows[:, 6:9], rows[:, 11:14] = position, velocity, acceleration, jerk
     for n in range(len(times_s)):
         bearing = bearing_rad(wanted_rad, ahead[n])
         if not math.isnan(bearing):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from uavexp.parameters import option
-from uavexp.safety.base import MustBrake
+from uavexp.safety.base import Guard, Unguarded
 from uavexp.types import Limits
 
 
@@ -11,6 +11,6 @@ from uavexp.types import Limits
 class NoBrake:
     """Never brakes; or nobody would ever collide and triggers could not be compared."""
 
-    def begin(self, limits: Limits) -> MustBrake:
+    def begin(self, limits: Limits) -> Guard:
         """Begin a trial."""
-        return lambda observation: False
+        return Unguarded()

@@ -16,7 +16,10 @@ class TriggerPolicy(Protocol):
         """Begin a trial."""
 
     def planned(self, trajectory: Trajectory, field: DistanceField) -> None:
-        """Take note of a new plan and of the live map it was made on (copy what is kept)."""
+        """Take note of a new plan and of the live map it was made on (copy what is kept).
+
+        The safety may have it flown later than planned: `Observation.trajectory` has the times of now.
+        """
 
     def decide(self, observation: Observation) -> Decision:
         """Whether to replan now, and why."""

@@ -15,7 +15,7 @@ from uavexp.field import DistanceField
 from uavexp.parameters import Positive, option
 from uavexp.path_clearance import clearance_ahead_m
 from uavexp.trajectory import Trajectory
-from uavexp.trigger.validity import comes_near, ends_within, is_flown
+from uavexp.trigger.validity import as_flown, comes_near, ends_within, is_flown
 from uavexp.types import Decision, Limits, Observation
 
 
@@ -42,6 +42,7 @@ class CollisionCheck:
         trajectory, now_s = self._trajectory, observation.time_s
         if not is_flown(trajectory, now_s):
             return Decision(replan=False)
+        trajectory = as_flown(trajectory, observation)
         ahead_m = clearance_ahead_m(trajectory, observation.field, now_s, self.horizon_s)
         if comes_near(ahead_m, self.clearance_m):
             return Decision(replan=True, cause=causes.COLLISION.name)

@@ -16,7 +16,7 @@ from uavexp.field import DistanceField
 from uavexp.geometry import polyline_length_m
 from uavexp.parameters import Positive, option
 from uavexp.trajectory import Trajectory, evaluate
-from uavexp.trigger.validity import ends_within, is_flown
+from uavexp.trigger.validity import as_flown, ends_within, is_flown
 from uavexp.types import Decision, Limits, Observation
 
 _SAMPLE_S = 0.02  # at 2.5 m/s half a voxel
@@ -44,6 +44,7 @@ class Distance:
         trajectory, now_s = self._trajectory, observation.time_s
         if not is_flown(trajectory, now_s):
             return Decision(replan=False)
+        trajectory = as_flown(trajectory, observation)
         score = flown_m(trajectory, now_s) / self.distance_m
         if score >= 1.0:
             return Decision(replan=True, cause=causes.DISTANCE.name, score=score)

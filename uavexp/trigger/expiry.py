@@ -15,7 +15,7 @@ from uavexp.field import DistanceField
 from uavexp.parameters import NonNegative, Positive, option
 from uavexp.path_clearance import clearance_ahead_m
 from uavexp.trajectory import Trajectory
-from uavexp.trigger.validity import comes_near, ends_within, is_flown, is_older
+from uavexp.trigger.validity import as_flown, comes_near, ends_within, is_flown, is_older
 from uavexp.types import Decision, Limits, Observation
 
 
@@ -49,15 +49,15 @@ class Expiry:
         return Decision(replan=cause != "", cause=cause, score=score)
 
     def _cause(self, trajectory: Trajectory, observation: Observation) -> str:
-        now_s = observation.time_s
-        ahead_m = clearance_ahead_m(trajectory, observation.field, now_s, self.horizon_s)
+        now_s, flown = observation.time_s, as_flown(trajectory, observation)
+        ahead_m = clearance_ahead_m(flown, observation.field, now_s, self.horizon_s)
         if comes_near(ahead_m, self.clearance_m):
             return causes.COLLISION.name
         if self.goal_updated and _is_another_goal(observation):
             return causes.GOAL.name
         if is_older(trajectory, now_s, self.expiry_s):
             return causes.EXPIRED.name
-        return causes.ARRIVAL.name if ends_within(trajectory, observation.goal, now_s, self.arrival_s) else ""
+        return causes.ARRIVAL.name if ends_within(flown, observation.goal, now_s, self.arrival_s) else ""
 
 
 def _is_another_goal(observation: Observation) -> bool:

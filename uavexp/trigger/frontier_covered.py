@@ -23,7 +23,7 @@ from uavexp.field import DistanceField
 from uavexp.parameters import NonNegative, Positive, PositiveShare, option
 from uavexp.path_clearance import clearance_ahead_m
 from uavexp.trajectory import Trajectory
-from uavexp.trigger.validity import comes_near, ends_within, is_flown, is_older, unknown_count
+from uavexp.trigger.validity import as_flown, comes_near, ends_within, is_flown, is_older, unknown_count
 from uavexp.types import Decision, Limits, Observation
 
 
@@ -61,11 +61,11 @@ class FrontierCovered:
         return Decision(replan=cause != "", cause=cause, score=score)
 
     def _cause(self, trajectory: Trajectory, observation: Observation, score: float) -> str:
-        now_s = observation.time_s
-        ahead_m = clearance_ahead_m(trajectory, observation.field, now_s, self.horizon_s)
+        now_s, flown = observation.time_s, as_flown(trajectory, observation)
+        ahead_m = clearance_ahead_m(flown, observation.field, now_s, self.horizon_s)
         if comes_near(ahead_m, self.clearance_m):
             return causes.COLLISION.name
-        if ends_within(trajectory, observation.goal, now_s, self.arrival_s):
+        if ends_within(flown, observation.goal, now_s, self.arrival_s):
             return causes.ARRIVAL.name
         if score > 1.0 and is_older(trajectory, now_s, self.min_age_s):
             return causes.COVERED.name

@@ -32,6 +32,7 @@ from uavexp.map_change import MapNear, changed_near, columns_near, map_near
 from uavexp.mapping.base import MapBackend
 from uavexp.parameters import Count, NonNegative, Positive, option
 from uavexp.trajectory import Trajectory, evaluate, sample_times
+from uavexp.trigger.validity import as_flown
 from uavexp.types import Decision, Goal, Limits, Observation
 
 _SAMPLE_S = 0.05  # at 2.5 m/s about one voxel apart
@@ -154,6 +155,11 @@ class Mcr:
             return 0.0
         return float(np.linalg.norm(observation.best_goal.position_m - before.position_m))
 
+    def _late_s(self, observation: Observation) -> float:
+        """By how much the plan is flown later than it was planned, s."""
+        planned = self._trajectory
+        return 0.0 if planned is None else as_flown(planned, observation).start_s - planned.start_s
+
     def _monitored(self, now_s: float) -> slice:
         if self.extent is Extent.WHOLE:
             return slice(None)
@@ -161,13 +167,14 @@ class Mcr:
 
     def _path_event(self, observation: Observation) -> Decision:
         """Clearance at the trajectory's points: dropped since the plan, low, and soon."""
-        part = self._monitored(observation.time_s)
+        now_s = observation.time_s - self._late_s(observation)
+        part = self._monitored(now_s)
         now_m = observation.field.distance_m(self._points_m[part])
         change_m = self._clearance_m[part] - now_m
         if self.since is Since.UPDATE:
             self._clearance_m[part] = now_m
         size_m = np.abs(change_m) if self.sign is Sign.BOTH else change_m
-        soon = self._times_s[part] - observation.time_s <= self.horizon_s
+        soon = self._times_s[part] - now_s <= self.horizon_s
         invalid = (size_m > self.delta_map_m) & (now_m < self.valid_clearance_m)
         touching = (change_m > _NOISE_M) & (now_m < self._touch_m)
         violated = (invalid | touching) & soon
@@ -179,7 +186,8 @@ class Mcr:
 
     def _region_event(self, observation: Observation) -> Decision:
         """Equation (20) over the voxels of B(tau)."""
-        voxel, largest_m = self._changed(observation, self._points_m[self._monitored(observation.time_s)])
+        part = self._monitored(observation.time_s - self._late_s(observation))
+        voxel, largest_m = self._changed(observation, self._points_m[part])
         score = largest_m / self.delta_map_m
         if len(voxel) < self.min_changed_voxels:
             return Decision(replan=False, score=score)

@@ -13,7 +13,7 @@ import numpy as np
 from uavexp.arrays import Float
 from uavexp.field import UNKNOWN, DistanceField
 from uavexp.trajectory import Trajectory, evaluate
-from uavexp.types import Goal
+from uavexp.types import Goal, Observation
 
 _SLACK_M = 0.03  # a third of a voxel: what the map's distances are exact to
 _TIME_S = 1e-9  # times are sums of steps
@@ -22,6 +22,13 @@ _TIME_S = 1e-9  # times are sums of steps
 def is_flown(trajectory: Trajectory | None, now_s: float) -> TypeGuard[Trajectory]:
     """Whether there is a plan and it has taken effect; during its latency the one before is flown."""
     return trajectory is not None and is_older(trajectory, now_s, 0.0)
+
+
+def as_flown(planned: Trajectory, observation: Observation) -> Trajectory:
+    """A plan with the times at which it is flown: later than planned where the safety slows it."""
+    flown = observation.trajectory
+    is_it = flown is not None and flown.coefficients is planned.coefficients
+    return flown if is_it and flown is not None else planned
 
 
 def is_older(trajectory: Trajectory, now_s: float, age_s: float) -> bool:

@@ -14,7 +14,7 @@ import pytest
 
 import uavexp
 from tests.components import build, options
-from tests.unit.pilot.test_holding import START, make
+from tests.unit.pilot.test_holding import START, make, room, see
 from tests.unit.trigger.test_trigger import LIMITS
 from tests.unit.vehicle.test_contact import scene_of
 from uavexp import trial
@@ -25,8 +25,11 @@ from uavexp.motion.base import Craft, Ending, Motion
 from uavexp.motion.compiled import Compiled, compiled_motion
 from uavexp.motion.stepwise import Stepwise
 from uavexp.movers.none import NoMovers
-from uavexp.pilot.holding import Holding, _Pending
+from uavexp.pace import pace_over
+from uavexp.pilot.flown import Flown
+from uavexp.pilot.holding import Holding
 from uavexp.recorder import Recorder
+from uavexp.safety.none import NoBrake
 from uavexp.scene import Scene
 from uavexp.store.logs import arrays_digest, log_arrays
 from uavexp.trajectory import Trajectory
@@ -49,7 +52,7 @@ def craft(
     made["controller"].reset(LIMITS, made["vehicle"].mass_kg)
     made["vehicle"].reset(hovering(START))
     pilot = made["pilot"].begin(make(Ssp()).crew)
-    pilot.trajectory = trajectory
+    pilot.flown = None if trajectory is None else Flown(trajectory=trajectory)
     return Craft(
         pilot=pilot,
         controller=made["controller"],
@@ -138,12 +141,26 @@ def test_through_all_that_a_pilot_does_between_two_ticks() -> None:
         pilot.best_goal = replace(goal, yaw_rad=yaw_rad)
 
     events = {
-        40: lambda pilot: setattr(pilot, "_pending", _Pending(later, goal, 0.7)),
+        40: lambda pilot: setattr(pilot, "_pending", Flown(trajectory=later, goal=goal, moves_s=0.7)),
         100: partial(look, -2.9),
         150: partial(look, math.nan),
-        200: lambda pilot: pilot._brake(2.0, "told to"),
+        200: lambda pilot: pilot._brake(see(room(), 2.0, pilot.reference(2.0, 0.0)), "told to"),
     }
     both(partial(craft, OPEN, None), range(0, STEPS + 1, 10), events)
+
+
+def test_at_the_pace_that_the_safety_sets() -> None:
+    """Slower, at rest, and delayed from then on."""
+    own_s, rate = np.linspace(0.9, 1.5, 31), np.linspace(1.0, 0.0, 31)
+
+    def slow(pilot: Any) -> None:
+        pilot.flown = replace(pilot.flown, pace=pace_over(0.9, own_s, rate, 0.005))
+
+    def go_on(pilot: Any) -> None:
+        seen = see(room(), 2.7, pilot.reference(2.7, 0.0))
+        pilot.flown = pilot.flown.repaced(seen, NoBrake().begin(LIMITS), stops=False)
+
+    both(partial(craft, OPEN, swinging(2)), range(0, STEPS + 1, 10), {90: slow, 270: go_on})
 
 
 def test_a_flight_that_ends_between_two_ticks_is_told_the_step() -> None:
@@ -174,11 +191,11 @@ def test_a_subclass_and_movers_fly_step_by_step() -> None:
     assert compiled_motion(among, hovering(START)) is None
 
 
-@pytest.mark.parametrize("strategy", ["mcr", "ssp"])
-def test_a_whole_flight_is_the_same(strategy: str, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("strategy", "safety"), [("mcr", "brake"), ("ssp", "brake"), ("mcr", "committed")])
+def test_a_whole_flight_is_the_same(strategy: str, safety: str, monkeypatch: pytest.MonkeyPatch) -> None:
     values = {
         "strategy": strategy, "seed": 2, "world": "random_columns", "world.size_m": [8.0, 6.0, 2.6],
-        "world.density_per_m2": 0.25, "stuck_s": 3.0, "safety": "brake",
+        "world.density_per_m2": 0.25, "stuck_s": 3.0, "safety": safety,
     }  # fmt: skip
     logs = [uavexp.fly(**values).log]
     monkeypatch.setattr(trial, "compiled_motion", lambda craft, state: None)

@@ -46,7 +46,7 @@ def make(
         explorer=explorer,
         trigger=trigger,
         planner=planner,
-        must_brake=safety.begin(LIMITS),
+        guard=safety.begin(LIMITS),
         limits=LIMITS,
         watch=Stopwatch(),
         latency_s=latency_s,

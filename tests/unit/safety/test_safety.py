@@ -34,7 +34,7 @@ def walled(x_m: float, *, unknown: bool = False) -> DistanceField:
 
 def first_brake_m(brake: Brake, field: DistanceField) -> float:
     """Position along x at which the brake first asks to stop."""
-    must_brake = brake.begin(LIMITS)
+    must_brake = brake.begin(LIMITS).must_brake
     times = np.arange(1.0, 6.0, 0.01)
     asked = [t for t in times if must_brake(flying(field, t))]
     return 0.5 + (asked[0] - 1.0) if asked else float("inf")
@@ -56,7 +56,7 @@ def test_brakes_before_unknown_space_only_when_asked() -> None:
 
 
 def test_no_brake_never_brakes() -> None:
-    assert not NoBrake().begin(LIMITS)(flying(walled(1.0), 2.0))
+    assert not NoBrake().begin(LIMITS).must_brake(flying(walled(1.0), 2.0))
 
 
 def test_a_vehicle_that_cannot_decelerate_is_refused() -> None:

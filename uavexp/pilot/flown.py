@@ -1,0 +1,65 @@
+"""What is flown: a trajectory, the goal at its end, and the pace at which the safety lets it be flown."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from uavexp.arrays import Float
+from uavexp.braking import braking_trajectory
+from uavexp.pace import AS_PLANNED, Pace, delayed, evaluate_paced
+from uavexp.safety.base import Guard
+from uavexp.trajectory import Trajectory
+from uavexp.types import Goal, Limits, Observation
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Flown:
+    """A trajectory on its way; `repaced` at every ESDF update."""
+
+    trajectory: Trajectory  # with the times at which it is flown, as of the last update
+    goal: Goal | None = None  # at its end; None: it is a stop
+    moves_s: float = -math.inf  # before, it only turns
+    pace: Pace = AS_PLANNED
+    waits_since_s: float = math.inf  # since when it has been stood still on before its end; inf: it moves
+
+    @property
+    def ends_s(self) -> float:
+        """When it is at rest, at its end or where the safety stops it."""
+        pace = self.pace
+        if not len(pace.rate):
+            return self.trajectory.end_s
+        left_s = self.trajectory.end_s - float(pace.own_s[-1])
+        last = float(pace.rate[-1])
+        return float(pace.times_s[-1]) + (max(left_s, 0.0) / last if last > 0.0 else 0.0)
+
+    def state(self, time_s: float) -> tuple[Float, Float, Float]:
+        """Position, velocity and acceleration (3,) of the reference."""
+        trajectory, pace = self.trajectory, self.pace
+        _, position, velocity, acceleration, _ = evaluate_paced(
+            trajectory.breaks_s, trajectory.coefficients, (pace.times_s, pace.own_s, pace.rate),
+            np.array([time_s]),
+        )  # fmt: skip
+        return position[0], velocity[0], acceleration[0]
+
+    def stopped(self, observation: Observation, guard: Guard, limits: Limits) -> Flown:
+        """A stop from here on: along the way where the safety stops so, else straight ahead."""
+        stop = self.repaced(observation, guard, stops=True)
+        if stop.pace is AS_PLANNED:
+            state = self.state(observation.time_s)
+            stop = Flown(trajectory=braking_trajectory(observation.time_s, *state, limits))
+        return replace(stop, goal=None)
+
+    def repaced(self, observation: Observation, guard: Guard, *, stops: bool) -> Flown:
+        """The same with the times and the pace of now; `stops`: it comes to rest soon."""
+        now_s = observation.time_s
+        own_s, *rate = self.pace.at(now_s)
+        late_s = now_s - own_s if own_s < now_s else 0.0
+        trajectory = delayed(self.trajectory, late_s) if late_s else self.trajectory
+        moves_s = self.moves_s + late_s
+        pace = guard.flyable(trajectory, now_s, (rate[0], rate[1]), observation, stops=stops).pace
+        waits = pace.rests_s <= now_s < trajectory.end_s and now_s >= moves_s
+        since_s = min(self.waits_since_s, now_s) if waits else math.inf
+        return replace(self, trajectory=trajectory, moves_s=moves_s, pace=pace, waits_since_s=since_s)
