@@ -45,8 +45,7 @@ READERS = {
     ".dxf": "dxf",
     ".wkt": "wkt",
 }
-# modules of the extra `formats` by their packages' names
-PACKAGES = {"ezdxf": "ezdxf", "laspy": "laspy", "shapely": "shapely"}
+LIBRARIES = ("ezdxf", "laspy", "shapely")  # of the extra `formats`
 
 
 def read(path: Path, options: Options) -> Content:
@@ -83,11 +82,11 @@ def _module(path: Path) -> ModuleType:
     try:
         return import_module(f"uavexp.formats.{READERS[path.suffix.lower()]}")
     except ModuleNotFoundError as error:
-        if error.name not in PACKAGES:
+        library = (error.name or "").partition(".")[0]
+        if library not in LIBRARIES:
             raise
         raise WorldError(
-            f"world file {path}: reading {path.suffix} needs {PACKAGES[error.name]}: "
-            "pip install 'uavexp[formats]'"
+            f"world file {path}: reading {path.suffix} needs {library}: pip install 'uavexp[formats]'"
         ) from error
 
 

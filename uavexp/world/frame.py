@@ -32,16 +32,10 @@ class Frame:
 
     def notes(self, content: Content) -> list[str]:
         """Return what a person should know of the unit and axis that the file names."""
-        notes = []
-        for name, said, used, usual in (
-            ("unit_m", content.unit_m, self.unit_m, 1.0),
-            ("up_axis", content.up_axis, self.up_axis, "z"),
-        ):
-            if said is not None and said != used:
-                notes.append(f"read with world.{name}={used}, though the file says {said}")
-            elif said is not None and said != usual:
-                notes.append(f"read with world.{name}={used}, as the file says")
-        return notes
+        return [
+            *_note("unit_m", content.unit_m, self.unit_m, 1.0, "give another if it is wrong"),
+            *_note("up_axis", content.up_axis, self.up_axis, "z", "z if the building lies on its side"),
+        ]
 
     def turned(self, points: Float) -> Float:
         """Points (N, 3) of the file in m, z up."""
@@ -78,6 +72,14 @@ class Frame:
 def frame_of(content: Content, path: str, unit_m: float | None, up_axis: str | None) -> Frame:
     """Return the frame that was asked for, else the one that the file names, else metres, z up."""
     return Frame(path=path, unit_m=unit_m or content.unit_m or 1.0, up_axis=up_axis or content.up_axis or "z")
+
+
+def _note(name: str, said: object, used: object, usual: object, otherwise: str) -> list[str]:
+    if said is not None and said != used:
+        return [f"read with world.{name}={used}, though the file says {said}"]
+    if said is not None and said != usual:
+        return [f"read with world.{name}={used}, as the file says; {otherwise}"]
+    return []
 
 
 def corners_of(cells: Cells) -> Float:
