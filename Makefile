@@ -12,7 +12,7 @@ SUPPORTED := import sys; (3, 11) <= sys.version_info < (3, 14) or sys.exit(1); p
 PYTHON ?= $(shell for name in $(PYTHONS); do $$name -c '$(SUPPORTED)' 2>/dev/null && break; done)
 UV ?= $(shell uv --version >/dev/null 2>&1 && echo uv)
 
-.PHONY: run test check bench golden conf lock clean
+.PHONY: run test check docs bench golden conf lock clean
 .DELETE_ON_ERROR:
 
 run: $(STAMP)
@@ -25,6 +25,9 @@ check: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+docs: $(STAMP)
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet --strict
 
 bench: $(STAMP)
 	@$(BIN)/python -m benchmarks

@@ -78,11 +78,23 @@ def _ordered(options: dict[str, dict[str, Path]]) -> dict[str, dict[str, Path]]:
     return {name: options[name] for name in dict.fromkeys(names) if name in options}
 
 
+def groups_of(user_folder: Path | None = None) -> list[str]:
+    """Groups in the order in which help tells of them, the presets first."""
+    return list(_ordered(list_options([conf_folder(), *([user_folder] if user_folder else [])])))
+
+
+def described(group: str, files: dict[str, Path] | None = None) -> list[tuple[str, Option, str]]:
+    """Name, parameters and description of each option of a group."""
+    found = []
+    for name, file in (list_options([conf_folder()])[group] if files is None else files).items():
+        option = read_option(file)
+        found.append((name, option, option.description or _docstring(group, name)))
+    return found
+
+
 def _group_text(group: str, files: dict[str, Path]) -> str:
     lines: list[str] = []
-    for name, file in files.items():
-        option = read_option(file)
-        description = option.description or _docstring(group, name)
+    for name, option, description in described(group, files):
         lines += [f"{group}={name}" + (f"    {description}" if description else "")]
         lines += [*_parameter_lines(option, f"{group}."), ""]
     return "\n".join(lines)

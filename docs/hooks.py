@@ -1,0 +1,105 @@
+"""Pages that nobody writes: of every group from its declared parameters, of every study from its results.
+
+They are made while the site is built, so they cannot go stale.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+
+from uavexp.cli.helptext import described, groups_of
+from uavexp.config.options import Option
+
+ROOT = Path(__file__).parents[1]
+PAPERS = {"mcr": "Paper 1", "voxel": "Paper 2", "inspect": "Paper 3", "dfbit": "Paper 4", "barn": "BARN"}
+SHIPPED = {"CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
+
+
+def on_config(config: MkDocsConfig) -> MkDocsConfig:
+    """Add the generated pages to the navigation."""
+    groups = [{group: f"reference/{group}.md"} for group in groups_of()]
+    studies = [
+        {title: [{folder.name: f"{folder.relative_to(ROOT).as_posix()}/index.md"} for folder in folders]}
+        for title, folders in _studies()
+    ]
+    config.nav = [*(config.nav or []), {"Parameters": groups}, {"Results": studies}]
+    return config
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Add the generated pages, and what they and the written ones show."""
+    for group in groups_of():
+        files.append(File.generated(config, f"reference/{group}.md", content=_group_page(group)))
+    for _, folders in _studies():
+        for folder in folders:
+            name = f"{folder.relative_to(ROOT).as_posix()}/index.md"
+            files.append(File.generated(config, name, content=_study_page(folder)))
+    for source, name in SHIPPED.items():
+        files.append(File.generated(config, name, content=_without_repository_links(ROOT / source)))
+    for path in _shown():
+        name = path.relative_to(ROOT).as_posix()
+        if path.suffix == ".md":
+            files.append(File.generated(config, name, content=_without_repository_links(path)))
+        else:
+            files.append(File.generated(config, name, abs_src_path=str(path)))
+    return files
+
+
+def _studies() -> Iterator[tuple[str, list[Path]]]:
+    """Folders of the committed studies, by paper."""
+    for paper, title in PAPERS.items():
+        if folders := sorted(file.parent for file in ROOT.glob(f"experiments/{paper}/results/*/study.json")):
+            yield title, folders
+
+
+def _shown() -> Iterator[Path]:
+    """Pictures, pages and texts of the results."""
+    for pattern in ("*.md", "pictures/*.png", "*/figures/*.png", "*/report.html"):
+        for path in sorted(ROOT.glob(f"experiments/*/results/{pattern}")):
+            if path.name != "README.md":
+                yield path
+
+
+def _without_repository_links(file: Path) -> str:
+    """A text whose links to files of the repository are names: the site does not hold those files."""
+    return re.sub(r"(?<!!)\[([^\]]+)\]\((?!https?:)[^)]*\)", r"\1", file.read_text(encoding="utf-8"))
+
+
+def _group_page(group: str) -> str:
+    """Every option of a group with its parameters."""
+    lines = [f"# {group}", ""]
+    for name, option, words in described(group):
+        lines += [f"## {group}={name}", "", words, "", *_parameters(group, option)]
+    return "\n".join(lines)
+
+
+def _parameters(group: str, option: Option) -> list[str]:
+    if not option.parameters:
+        return []
+    rows = [
+        f"| `{group}.{item.name}` | `{item.default or ' '}` | {item.comment.replace('|', chr(92) + '|')} |"
+        for item in option.parameters
+    ]
+    return ["| parameter | default | meaning |", "|---|---|---|", *rows, ""]
+
+
+def _study_page(folder: Path) -> str:
+    """Command, verdicts, tables and figures of a study, as its report made them."""
+    study: dict[str, Any] = json.loads((folder / "study.json").read_text(encoding="utf-8"))
+    lines = [f"# {study['title'] or folder.name}", "", f"`python -m uavexp experiments={study['name']}`", ""]
+    if (folder / "report.html").exists():
+        lines += ["[The report as one page](report.html)", ""]
+    tables = sorted((folder / "tables").glob("*.md"))
+    for file in [*tables, *([folder / "claims.md"] if (folder / "claims.md").exists() else [])]:
+        lines += [re.sub(r"(?m)^### ", "## ", file.read_text(encoding="utf-8")), ""]
+    for figure in sorted((folder / "figures").glob("*.png")):
+        name = figure.stem.replace("_", " ")
+        lines += [f"## {name}", "", f"![{name}](figures/{figure.name})", ""]
+    return "\n".join(lines)
