@@ -105,13 +105,14 @@ def check_world(cell: Cell, seed: int, keep: Keep) -> None:
         keep: as for `fly_cell`.
 
     Raises:
-        WorldError: the world cannot be made or read.
+        WorldError: the world cannot be made or read, its map is too large, or what flies does not fit.
     """
-    from uavexp.seeding import Stream, generator
+    from uavexp.scene import Scene
+    from uavexp.trial import make_world
 
     parts = build(cell.config)
-    layout = seed if parts.world_seed is None else parts.world_seed
-    keep(parts.world).generate(generator(layout, Stream.WORLD))
+    world = make_world(replace(parts, world=keep(parts.world)), seed)
+    parts.mapping.reset(world.bounds_m, Scene(world))
 
 
 def repeat_command(cell: Cell, seed: int, user_folder: Path | None = None) -> str:

@@ -20,11 +20,13 @@ from uavexp.geometry import quaternion_from_yaw
 from uavexp.log import TrialLog
 from uavexp.mapping.base import MapBackend
 from uavexp.mission.base import Mission
+from uavexp.mission.goto import Goto
 from uavexp.motion.base import Craft, Ending, Judge, Motion
 from uavexp.motion.compiled import compiled_motion
 from uavexp.motion.stepwise import Stepwise
 from uavexp.movers.base import Movers
 from uavexp.parameters import NonNegative, Positive, Whole, between, option
+from uavexp.passage import check_passage
 from uavexp.pilot.base import Crew, Pilot
 from uavexp.planner.base import Planner
 from uavexp.recorder import Recorder, Stopwatch
@@ -118,10 +120,21 @@ def fly_trial(parts: Parts, seed: int, progress: Progress | None = None) -> tupl
         WorldError: when the world cannot be made.
         ConfigError: a part drew from a global generator.
     """
+    world = make_world(parts, seed)
+    return world, fly(parts, world, seed, progress)
+
+
+def make_world(parts: Parts, seed: int) -> World:
+    """Draw the seed's world as it is when its flight begins.
+
+    Raises:
+        WorldError: it cannot be made, or not be flown by these parts.
+    """
     layout = seed if parts.world_seed is None else parts.world_seed
     world = parts.world.generate(generator(layout, Stream.WORLD))
-    world = parts.mission.prepare(world, generator(seed, Stream.MISSION))
-    return world, fly(parts, world, seed, progress)
+    if world.name == "file" and isinstance(parts.mission, Goto):  # other worlds promise their clearance
+        check_passage(world, parts.planner, parts.explorer, parts.mapping, parts.vehicle.limits)
+    return parts.mission.prepare(world, generator(seed, Stream.MISSION))
 
 
 def fly(parts: Parts, world: World, seed: int, progress: Progress | None = None) -> TrialLog:

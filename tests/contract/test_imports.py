@@ -19,7 +19,7 @@ LAYERS = (
     {"braking", "triangle_grid", "bodies", "scene", "formats"},
     {"cloud"},
     {"roles", "metrics", "inspection"},
-    {"recorder", "seen_share", "pilot", "motion", "trial"},
+    {"recorder", "seen_share", "passage", "pilot", "motion", "trial"},
     {"config"},
     {"flight", "__init__"},
     {"store", "check"},

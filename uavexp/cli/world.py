@@ -27,9 +27,10 @@ from uavexp.formats import FREE, SOLID, UNMEASURED
 from uavexp.geometry import polyline_length_m
 from uavexp.seeding import Stream, generator
 from uavexp.types import World
-from uavexp.world.file import File, Survey
+from uavexp.world.file import File
 from uavexp.world.free_parts import Part, parts_told, text
-from uavexp.world.task import bottleneck_m
+from uavexp.world.survey import Survey
+from uavexp.world.widest import bottleneck_m
 
 _USAGE = """usage: python -m uavexp.world FILE [world.KEY=VALUE ...] [seed=0] [--json] [--out PICTURE.png]
 

@@ -29,6 +29,7 @@ D <- (w D + d) / (w + 1) with capped w (Curless and Levoy 1996), and judged:
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numba as nb
@@ -179,9 +180,11 @@ def grid_shape(
     need_mb = float(np.prod(count)) * bytes_per_voxel / 1e6
     if need_mb > max_memory_mb or float(np.prod(count)) > 2**31 - 1:
         extent = " x ".join(f"{edge:.6g}" for edge in size[1] - size[0])
+        fits_m = math.ceil(100.0 * voxel_size_m * (need_mb / max_memory_mb) ** (1.0 / 3.0) + 0.5) / 100.0
         raise WorldError(
-            f"a map of {extent} m at voxel_size_m {voxel_size_m} needs {need_mb:,.0f} MB, "
-            f"allowed are {max_memory_mb:,.0f} MB (mapping.max_memory_mb)"
+            f"a map of {extent} m at voxel_size_m {voxel_size_m} needs {need_mb:,.0f} MB, allowed are "
+            f"{max_memory_mb:,.0f} MB: mapping.voxel_size_m={fits_m:g} fits, or "
+            f"mapping.max_memory_mb={math.ceil(need_mb):d}, or give smaller world.flight_bounds_m"
         )
     return int(count[0]), int(count[1]), int(count[2])
 

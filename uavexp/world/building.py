@@ -93,7 +93,7 @@ def _check_size(points_m: Float, bounds_m: Float | None, frame: Frame) -> None:
 def _notes(cells: Cells | None, reading: Reading, origin_m: Float) -> list[str]:
     notes = []
     if origin_m.any():
-        taken = ", ".join(f"{value:g}" for value in origin_m)
+        taken = ",".join(f"{value:.12g}" for value in origin_m)
         notes.append(f"its far origin [{taken}] m was taken off all coordinates, those you give included")
     share = 0.0 if cells is None else float(np.mean(cells.state == UNMEASURED))
     if share >= _TELL_UNMEASURED:

@@ -159,4 +159,4 @@ def _middle_m(parts: FreeParts, number: int) -> Float:
 
 def text(values: Float) -> str:
     """A point as it is typed."""
-    return "[" + ",".join(f"{value:g}" for value in np.round(values, 2)) + "]"
+    return "[" + ",".join(f"{value:.12g}" for value in np.round(values, 2)) + "]"

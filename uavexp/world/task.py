@@ -37,7 +37,6 @@ TIGHTEN_ROUNDS = 3
 BAND_M = 0.6  # height of the band in which clutter is measured, around the start's height
 GAP_STEP_M = 0.05  # between the points where the width of the passage is measured
 GAP_CHORDS = 7  # directions tried at each
-BOTTLENECK_STEP_M = 0.01
 
 
 def shortest_path(
@@ -57,15 +56,31 @@ def shortest_path(
     Returns:
         The path, ends included; (0, 3) when the two are not joined.
     """
+    path = lattice_path(scene, flight_bounds_m, start_m, target_m, clearance_m, cell_m)
+    return tightened(scene, path, clearance_m) if path.shape[0] else path
+
+
+def lattice_path(
+    scene: Scene,
+    flight_bounds_m: Float,
+    start_m: Float,
+    target_m: Float,
+    clearance_m: float,
+    cell_m: float = CELL_M,
+) -> Float:
+    """The exact shortest path (P, 3) on the lattice; arguments and return as `shortest_path`."""
     radius_m = proof_radius_m(clearance_m, math.sqrt(3.0) * cell_m)
     nodes = make_nodes(scene.grid, flight_bounds_m, cell_m, radius_m)
     path: Float = shortest_lattice_path(nodes, clearance_m, start_m, target_m)
-    if path.shape[0] == 0:
-        return path
-    path = skip_ahead(scene.grid, path, clearance_m)
-    for _ in range(TIGHTEN_ROUNDS):
-        path = tighten(scene.grid, _knots(path), clearance_m)
     return path
+
+
+def tightened(scene: Scene, path_m: Float, clearance_m: float) -> Float:
+    """A path (P, 3) that keeps a clearance, pulled tight by lines of sight that keep it."""
+    path_m = skip_ahead(scene.grid, path_m, clearance_m)
+    for _ in range(TIGHTEN_ROUNDS):
+        path_m = tighten(scene.grid, _knots(path_m), clearance_m)
+    return path_m
 
 
 def _knots(path_m: Float) -> Float:
@@ -76,23 +91,6 @@ def _knots(path_m: Float) -> Float:
         count = max(1, math.ceil(float(np.linalg.norm(b - a)) / step))
         pieces.append(a + (b - a) * (np.arange(1, count + 1) / count)[:, None])
     return np.concatenate(pieces)
-
-
-def bottleneck_m(
-    scene: Scene, flight_bounds_m: Float, start_m: Float, target_m: Float, below_m: float
-) -> float:
-    """Largest clearance at which start and target are joined on the fine lattice.
-
-    Returns:
-        A multiple of 1 cm under `below_m`; 0 when they are not joined at all.
-    """
-    low, high = 0, math.ceil(below_m / BOTTLENECK_STEP_M)
-    while high - low > 1:
-        middle = (low + high) // 2
-        clearance = middle * BOTTLENECK_STEP_M
-        joined = shortest_path(scene, flight_bounds_m, start_m, target_m, clearance, FINE_CELL_M).shape[0]
-        low, high = (middle, high) if joined else (low, middle)
-    return low * BOTTLENECK_STEP_M
 
 
 def free_layer(

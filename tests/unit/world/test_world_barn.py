@@ -11,9 +11,9 @@ import pytest
 from tests.folders import SHARED
 from uavexp.errors import ConfigError
 from uavexp.scene import Scene
-from uavexp.world import task
 from uavexp.world.barn import Barn
 from uavexp.world.barn_layouts import COUNT, layout, name_of, number_of
+from uavexp.world.widest import bottleneck_m
 
 BARN, GAZEBO = SHARED / "barn", SHARED / "gazebo" / "barn" / "static"
 needs_barn = pytest.mark.skipif(not BARN.is_dir(), reason="../shared/data/barn is absent")
@@ -79,7 +79,7 @@ def test_all_air_is_inside_and_cylinders_are_not() -> None:
 @pytest.mark.parametrize("number", [8, 60, 252])
 def test_the_bottleneck_is_that_of_the_published_map(number: int) -> None:
     world = Barn(number=number).generate(np.random.default_rng(0))
-    widest = task.bottleneck_m(Scene(world), world.flight_bounds_m, world.start_m, world.target_m, 1.3)
+    widest = bottleneck_m(Scene(world), world.flight_bounds_m, world.start_m, world.target_m, 1.3)
     assert widest == pytest.approx(
         float(index()[number]["bottleneck_clearance_m"]), abs=0.04
     )  # cells of 0.05 m

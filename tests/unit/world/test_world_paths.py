@@ -13,6 +13,7 @@ from uavexp.world import task
 from uavexp.world.boxes import Boxes
 from uavexp.world.line_of_sight import in_sight
 from uavexp.world.shortest import make_nodes, passable_nodes, shortest_lattice_path
+from uavexp.world.widest import bottleneck_m, widest_path
 
 BOUNDS = np.array([[0.0, 0.0, 0.0], [4.0, 3.0, 1.2]])
 
@@ -81,7 +82,7 @@ def test_found_path_keeps_the_clearance_all_along(seed: int) -> None:
     start, target = np.array([0.05, 0.1, 0.5]), np.array([3.93, 2.9, 0.6])
     path = task.shortest_path(scene, BOUNDS, start, target, clearance)
     if path.shape[0] == 0:
-        assert task.bottleneck_m(scene, BOUNDS, start, target, clearance) < clearance
+        assert bottleneck_m(scene, BOUNDS, start, target, clearance) < clearance + 0.03  # the lattice's
         return
     np.testing.assert_array_equal(path[[0, -1]], [start, target])
     along = np.linspace(0.0, 1.0, 200)[:, None, None]
@@ -121,12 +122,15 @@ def test_bottleneck_is_half_the_gap_between_two_walls() -> None:
     boxes.span((2.0, 1.6, -5.0), (2.2, 8.0, 5.0))
     scene = Scene.from_mesh(*boxes.mesh())
     start, target = np.array([0.5, 0.5, 0.5]), np.array([3.5, 2.5, 0.5])
-    bottleneck = task.bottleneck_m(scene, BOUNDS, start, target, 0.5)
-    assert 0.26 <= bottleneck <= 0.30  # half of 0.6 m, less what the 0.05 m lattice misses
-    fine = task.FINE_CELL_M
-    assert task.shortest_path(scene, BOUNDS, start, target, bottleneck, fine).shape[0] > 0
-    assert task.shortest_path(scene, BOUNDS, start, target, bottleneck + 0.01, fine).shape[0] == 0
-    assert task.bottleneck_m(scene, BOUNDS, start, target, 0.2) == pytest.approx(0.19)
+    path, bottleneck = widest_path(scene, BOUNDS, start, target, 0.5)
+    assert 0.298 <= bottleneck <= 0.3
+    assert scene.distance_m(path).min() >= bottleneck
+    tight = task.tightened(scene, path, bottleneck)
+    assert polyline_length_m(tight) <= polyline_length_m(path)
+    assert scene.distance_m(tight).min() >= bottleneck - 1e-6
+    assert bottleneck_m(scene, BOUNDS, start, target, 0.2) >= 0.2
+    shut = np.array([3.5, 2.5, 0.5]), np.array([2.1, 0.5, 0.5])  # inside the wall
+    assert bottleneck_m(scene, BOUNDS, *shut, 0.2) == 0.0
     path = task.shortest_path(scene, BOUNDS, start, target, 0.2)
     assert task.narrowest_gap_m(scene, path) == pytest.approx(0.6, abs=0.02)
 
