@@ -41,11 +41,11 @@ def read(path: Path, options: Options) -> Content:
             raise WorldError(f"world file {path} is truncated or no dxf file: its end, EOF, is missing")
     with damaged(path, "dxf"):
         drawing = readfile(path)
-        wanted = _wanted(path, drawing, options.layers)
-        lines, layers, left = _lines(path, drawing, wanted)
+        walls = _walls(path, drawing, options.layers)
+        lines, layers, left = _lines(path, drawing, walls, bool(options.layers))
     if not lines:
         raise WorldError(
-            f"world file {path} holds no {' '.join(LINES)} on the layers {' '.join(sorted(wanted))}"
+            f"world file {path} holds no {' '.join(LINES)} on the layers {' '.join(sorted(walls))}"
         )
     height = options.wall_height_m
     corners = np.concatenate(lines)
@@ -54,9 +54,11 @@ def read(path: Path, options: Options) -> Content:
     return base.mesh(path, "dxf plan", *surface, warnings=tuple(_warnings(drawing, options, layers, left)))
 
 
-def _wanted(path: Path, drawing: Any, asked: tuple[str, ...]) -> set[str]:
+def _walls(path: Path, drawing: Any, asked: tuple[str, ...]) -> set[str]:
     """Names, in small letters, of the layers that are walls."""
-    there = {layer.dxf.name.lower(): layer for layer in drawing.layers}
+    used = {entity.dxf.layer.lower() for entity in drawing.modelspace()} | {"0"}
+    table = {layer.dxf.name.lower(): layer for layer in drawing.layers}
+    there = used | set(table)  # a layer need not stand in the table
     missing = [name for name in asked if name.lower() not in there]
     if missing:
         raise WorldError(
@@ -64,17 +66,20 @@ def _wanted(path: Path, drawing: Any, asked: tuple[str, ...]) -> set[str]:
         )
     if asked:
         return {name.lower() for name in asked}
-    return {name for name, layer in there.items() if not (layer.is_off() or layer.is_frozen())} | {"0"}
+    return there - {name for name, layer in table.items() if layer.is_off() or layer.is_frozen()}
 
 
-def _lines(path: Path, drawing: Any, wanted: set[str]) -> tuple[list[Float], Counter[str], Counter[str]]:
-    """Polylines (P, 2) on the wanted layers; how many of each layer; what was left out, by its reason."""
+def _lines(
+    path: Path, drawing: Any, walls: set[str], asked: bool
+) -> tuple[list[Float], Counter[str], Counter[str]]:
+    """Polylines (P, 2) on the layers of walls; how many of each layer; what was left out, by its reason."""
     lines: list[Float] = []
     layers: Counter[str] = Counter()
     left: Counter[str] = Counter()
     for layer, entity in _entities(path, drawing.modelspace()):
-        if layer.lower() not in wanted:
-            left[f"on layer {layer}"] += 1
+        if layer.lower() not in walls:
+            if not asked:
+                left[f"on layer {layer}"] += 1  # switched off
             continue
         line = _polyline(path, entity)
         if line is None:

@@ -76,6 +76,8 @@ def _points(path: Path) -> Float:
 
 def _unpacked(path: Path) -> Float:
     """Points of a compressed file, unpacked by a child: lazrs aborts the process that damage misleads."""
+    if not laspy.LazBackend.detect_available():
+        raise WorldError(f"world file {path}: reading .laz needs lazrs: pip install 'uavexp[formats]'")
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "points.npy"
         command = [sys.executable, "-c", _UNPACK, str(path), str(out)]

@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
+import numpy.typing as npt
 import yaml  # type: ignore[import-untyped]  # with omegaconf
 from PIL import Image
 
-from uavexp.arrays import Bool, Float, UInt8
+from uavexp.arrays import Bool, Float, Int, UInt8
 from uavexp.errors import WorldError
 from uavexp.formats.base import FREE, SOLID, UNMEASURED, Cells, Content, Options
 from uavexp.formats.guard import damaged
@@ -23,6 +24,7 @@ MOST_YAML_BYTES = 1 << 20
 IMAGES = ("PNG", "BMP", "PPM")  # what Nav2's map_saver writes; PPM is Pillow's name of pgm's family
 SLAM_GREY = 205  # of 255: with it map_saver paints what it never measured
 
+Levels = npt.NDArray[np.uint16]
 Mode = Literal["trinary", "scale", "raw"]
 
 
@@ -53,8 +55,10 @@ def read(path: Path, options: Options) -> Content:
     thresholds are 0.65 and 0.25, map_saver's defaults.
     """
     described = describe(path)
-    brightness, opaque = _image(described.image)
-    state = _state(described, brightness)
+    levels, top, opaque = _image(described.image)
+    brightness = np.arange(top + 1) / top
+    state_of = _state(described, brightness)
+    state = state_of[levels]
     if described.mode != "raw":
         state[~opaque] = UNMEASURED
     return Content(
@@ -66,7 +70,7 @@ def read(path: Path, options: Options) -> Content:
             yaw_rad=described.yaw_rad,
             is_plan=True,
         ),
-        warnings=_slam_grey(described, brightness, state),
+        warnings=_slam_grey(described, brightness, state_of, np.bincount(levels.ravel(), minlength=top + 1)),
     )
 
 
@@ -141,8 +145,8 @@ def _truth(path: Path, name: str, value: object) -> bool:
     return _number(path, name, value) != 0.0
 
 
-def _image(path: Path) -> tuple[Float, Bool]:
-    """Brightness (rows, columns), 0 to 1, and which pixels are opaque."""
+def _image(path: Path) -> tuple[Levels, int, Bool]:
+    """Level of each pixel (rows, columns), the level of white, and which pixels are opaque."""
     if not path.exists():
         raise WorldError(f"map image {path} does not exist")
     if not path.is_file():
@@ -155,21 +159,22 @@ def _image(path: Path) -> tuple[Float, Bool]:
                 raise WorldError(
                     f"map image {path} has {width} x {height} pixels, at most {MOST_PIXELS:.0e} are allowed"
                 )
-            return _brightness(image)
+            return _levels(image)
 
 
-def _brightness(image: Image.Image) -> tuple[Float, Bool]:
+def _levels(image: Image.Image) -> tuple[Levels, int, Bool]:
     if image.mode.startswith("I"):  # 16 bits
-        grey = np.asarray(image, dtype=np.float64) / 65535.0
-        return grey, np.ones(grey.shape, dtype=np.bool_)
+        grey = np.asarray(image).astype(np.uint16)
+        return grey, 65535, np.ones(grey.shape, dtype=np.bool_)
     if image.mode in ("1", "L"):
-        grey = np.asarray(image.convert("L"), dtype=np.float64) / 255.0
-        return grey, np.ones(grey.shape, dtype=np.bool_)
+        grey = np.asarray(image.convert("L")).astype(np.uint16)
+        return grey, 255, np.ones(grey.shape, dtype=np.bool_)
     channels = np.asarray(image.convert("RGBA"))
-    return channels[..., :3].mean(axis=2) / 255.0, channels[..., 3] == 255
+    return channels[..., :3].sum(axis=2, dtype=np.uint16), 3 * 255, channels[..., 3] == 255
 
 
 def _state(described: Description, brightness: Float) -> UInt8:
+    """State of pixels of each brightness, 0 to 1."""
     if described.mode == "raw":
         value = np.rint(255.0 * brightness)
         return _graded(np.where(value <= 100.0, value, np.nan))
@@ -188,10 +193,10 @@ def _of(solid: Bool, free: Bool) -> UInt8:
     return np.where(solid, SOLID, np.where(free, FREE, UNMEASURED)).astype(np.uint8)
 
 
-def _slam_grey(described: Description, brightness: Float, state: UInt8) -> tuple[str, ...]:
-    """A warning when the thresholds call the grey free that means unmeasured."""
+def _slam_grey(described: Description, brightness: Float, state: UInt8, pixels: Int) -> tuple[str, ...]:
+    """A warning when the thresholds call the grey free that means unmeasured; `pixels` of each level."""
     grey = (np.rint(255.0 * brightness) == SLAM_GREY) & (state == FREE)
-    share = np.count_nonzero(grey) / grey.size
+    share = pixels[grey].sum() / pixels.sum()
     if described.mode == "raw" or not share:
         return ()
     return (

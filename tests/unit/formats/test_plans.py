@@ -162,16 +162,17 @@ def test_layers_are_chosen_and_others_told(tmp_path: Path) -> None:
         square(document)
         space = document.modelspace()  # type: ignore[attr-defined]
         space.add_line((1, 1), (3, 1), dxfattribs={"layer": "doors"})
+        space.add_line((3, 3), (5, 3), dxfattribs={"layer": "loose"})  # in no table
         space.add_text("way in", dxfattribs={"layer": "walls"})
         document.layers.add("old").off()  # type: ignore[attr-defined]
         space.add_line((1, 1), (3, 3), dxfattribs={"layer": "old"})
 
     path = drawn(tmp_path / "a.dxf", draw, unit=4)
     content = read(path, Options(wall_height_m=HEIGHT))
-    assert areas(content)[0] == pytest.approx(22 * HEIGHT)
+    assert areas(content)[0] == pytest.approx(24 * HEIGHT)
     told = "; ".join(content.warnings)
     assert "0.001" in told  # m, of a millimetre
-    assert "doors (1), walls (1)" in told
+    assert "doors (1), loose (1), walls (1)" in told
     assert "1 TEXT" in told
     assert "1 on layer old" in told
     chosen = read(path, Options(wall_height_m=HEIGHT, layers=("Walls",)))
