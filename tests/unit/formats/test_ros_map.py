@@ -49,6 +49,7 @@ def states(content: Content) -> list[list[int]]:
             [S, F, S, S, F, U],
         ),
         ("mode: scale\noccupied_thresh: 0.8\nfree_thresh: 0.2\n", [51, 204, 128, 105, 176], [S, F, U, S, F]),
+        ("occupied_thresh: 1.0\nfree_thresh: 0.0\n", [0, 1, 254, 255], [S, U, U, F]),  # a threshold is inside
         ("mode: raw\n", [0, 19, 20, 64, 65, 100, 101, 255], [F, F, U, U, S, S, U, U]),
         ("mode: raw\nnegate: 1\n", [0, 100, 255], [F, S, U]),
     ],

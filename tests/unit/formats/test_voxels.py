@@ -51,6 +51,7 @@ def test_voxels_of_every_spelling_are_the_same_cells(tmp_path: Path, arrays: dic
     assert [state_at(cells, point) for point in SOLIDS] == [SOLID, SOLID]
     assert [state_at(cells, point) for point in FREES] == [FREE, FREE]
     assert np.bincount(cells.state.ravel()).tolist() == [4 * 2 * 3 - 4, 2, 2]
+    np.testing.assert_allclose(cells.origin, 0.0, atol=1e-12)
 
 
 def test_without_measured_free_ones_all_others_are_free(tmp_path: Path) -> None:
@@ -60,8 +61,9 @@ def test_without_measured_free_ones_all_others_are_free(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["points", "points_m", "occupied"])
 def test_points_are_a_cloud(tmp_path: Path, name: str) -> None:
-    np.savez(tmp_path / "p.npz", **{name: np.asfortranarray(SOLIDS), "more": np.array(["text"])})
-    np.testing.assert_array_equal(read(tmp_path / "p.npz", Options()).points, SOLIDS)
+    points = SOLIDS + np.array([4e5, 5.6e6, 0.001])  # far origins stay
+    np.savez(tmp_path / "p.npz", **{name: np.asfortranarray(points), "more": np.array(["text"])})
+    np.testing.assert_array_equal(read(tmp_path / "p.npz", Options()).points, points)
 
 
 def test_what_would_not_fit_is_refused_before_it_is_unpacked(tmp_path: Path) -> None:
@@ -69,16 +71,18 @@ def test_what_would_not_fit_is_refused_before_it_is_unpacked(tmp_path: Path) -> 
     np.lib.format.write_array_header_1_0(
         header, {"descr": "<f8", "fortran_order": False, "shape": (10**9, 3)}
     )
-    with zipfile.ZipFile(tmp_path / "bomb.npz", "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("points.npy", header.getvalue() + bytes(800))
+    for names in (["points"], ["points", "occupied"]):
+        with zipfile.ZipFile(tmp_path / f"{len(names)}.npz", "w", zipfile.ZIP_DEFLATED) as archive:
+            for name in names:
+                archive.writestr(f"{name}.npy", header.getvalue() + bytes(800))
     with pytest.raises(WorldError, match="does not fit"):
-        read(tmp_path / "bomb.npz", Options())
-    data = bytearray((tmp_path / "bomb.npz").read_bytes())
-    place = data.index(b"PK\x01\x02") + 24  # the unpacked size in the zip's directory
-    data[place : place + 4] = (0xF0000000).to_bytes(4, "little")
-    (tmp_path / "bomb.npz").write_bytes(bytes(data))
-    with pytest.raises(WorldError, match=r"damaged|GiB"):
-        read(tmp_path / "bomb.npz", Options())
+        read(tmp_path / "1.npz", Options())
+    size = (0xF0000000).to_bytes(4, "little")  # 3.75 GiB, in the zip's directory
+    head, *members = (tmp_path / "2.npz").read_bytes().split(b"PK\x01\x02")
+    forged = [member[:20] + size + member[24:] for member in members]
+    (tmp_path / "2.npz").write_bytes(b"PK\x01\x02".join([head, *forged]))
+    with pytest.raises(WorldError, match=r"7\.5 GiB"):
+        read(tmp_path / "2.npz", Options())
 
 
 @pytest.mark.parametrize(
