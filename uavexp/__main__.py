@@ -9,6 +9,7 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
+from uavexp import __version__
 from uavexp.errors import ConfigError, UavexpError, one_line
 
 
@@ -43,6 +44,7 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("-m", "--multirun", action="store_true")
     parser.add_argument("--cfg", choices=("job", "hydra", "all"))
     parser.add_argument("--info", action="store_true")
+    parser.add_argument("--version", action="store_true")
     parser.add_argument("--config-dir", "-cd", metavar="DIR")
     return parser.parse_intermixed_args(arguments)
 
@@ -62,6 +64,9 @@ def _run(typed: Sequence[str]) -> int:
         sys.stdout.write(help_text(folder, *words[:1]))
         return 0
 
+    if arguments.version:
+        sys.stdout.write(f"uavexp {__version__}\n")
+        return 0
     if arguments.info:
         from uavexp.cli.show import info_text
 

@@ -138,7 +138,9 @@ def check_value(name: str, value: Any, annotation: Any) -> Any:
     except ConfigError:
         raise
     except (TypeError, ValueError, ArithmeticError) as error:
-        raise ConfigError(f"{name} must be {describe(annotation)}, got {value!r}") from error
+        is_number = isinstance(value, int | float) and describe(annotation).startswith("[")
+        hint = f"; a list is typed in brackets, {name}=[...]" if is_number else ""
+        raise ConfigError(f"{name} must be {describe(annotation)}, got {value!r}{hint}") from error
 
 
 def describe(annotation: Any) -> str:

@@ -40,6 +40,7 @@ flags
   -m, --multirun       accepted for Hydra's sake; grids are expanded without it too
   --cfg job|hydra|all  print the composed configuration and fly nothing
   --info               print versions and folders and fly nothing
+  --version            print the version
   --config-dir DIR     your own options, DIR/<group>/<option>.yaml; their classes must be in a package
                        named in the environment variable UAVEXP_TRUST
 """

@@ -47,6 +47,7 @@ def parse_settings(texts: Sequence[str]) -> list[Setting]:
     from hydra.core.override_parser.overrides_parser import OverridesParser
 
     parser = OverridesParser.create()
+    texts = [re.sub(r"^experiment=", "experiments=", text) for text in texts]  # as Hydra's users type it
     settings = [setting for text in texts for setting in _parse(parser, text)]
     seen: set[str] = set()
     for setting in settings:
@@ -103,7 +104,10 @@ def _sweep_values(override: Override, text: str) -> tuple[Any, ...]:
     values = [item.text if isinstance(item, QuotedString) else item for item in override.sweep_iterator()]
     if not values:
         raise ConfigError(f"{text}: the range is empty")
-    return tuple(override._convert_value(item) for item in values)
+    converted = (override._convert_value(item) for item in values)
+    if override.is_range_sweep():  # 0.05 + 2 * 0.05 is 0.15, whatever the processor says
+        return tuple(float(f"{item:.12g}") if isinstance(item, float) else item for item in converted)
+    return tuple(converted)
 
 
 def _check_range(value: Any, text: str) -> None:

@@ -76,6 +76,14 @@ def test_a_grid_is_every_combination_once_with_the_first_key_slowest() -> None:
     assert cells == [(a, "x", c) for a in (1, 2) for c in (0, 1, 2)]
 
 
+def test_a_range_of_decimals_has_the_decimals_that_one_would_type() -> None:
+    assert parse_settings(["a=range(0.05,0.35,0.05)"])[0].values == (0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
+
+
+def test_experiment_is_understood_as_hydra_users_type_it() -> None:
+    assert parse_settings(["experiment=mcr/table1"]) == parse_settings(["experiments=mcr/table1"])
+
+
 def test_nothing_typed_is_one_cell() -> None:
     assert expand_grid([]) == [()]
 
