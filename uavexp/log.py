@@ -77,6 +77,19 @@ class Ticks:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class MapGrid:
+    """The map at the end on its grid of voxels, and since when; empty in logs that did not note it."""
+
+    origin_m: Float = field(default_factory=none())  # (3,) lower corner of voxel (0, 0, 0)
+    voxel_size_m: float = math.nan
+    shape: Int = field(default_factory=none(dtype=np.int64))  # (3,) voxels along x, y and z
+    free: UInt8 = field(default_factory=none(dtype=np.uint8))  # bits of `np.packbits`, C order
+    occupied_s: Float32 = field(
+        default_factory=none(dtype=np.float32)
+    )  # (N,) when each of `TrialLog.mapped_m` was first mapped as occupied
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MoverRows:
     """The movers in truth, one row per simulation step."""
 
@@ -155,6 +168,7 @@ class TrialLog:
     goals_m: Float  # (G, 3) distinct goals pursued, in order
     seen_share: float  # observed share of the reachable free volume; NaN when not asked for
     mapped_m: Float32  # (N, 3) occupied voxel centres of the map at the end, for pictures
+    grid: MapGrid = MapGrid()
     movers: MoverRows = MoverRows()
     tracks: TrackRows = TrackRows()
     first_plan: FirstPlan = FirstPlan()

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from uavexp.arrays import Float
+from uavexp.arrays import Float, Int32
 from uavexp.bodies import distance_m
 from uavexp.field import OCCUPIED, DistanceField
 from uavexp.log import (
@@ -24,6 +24,7 @@ from uavexp.log import (
     TrackRows,
     TrialLog,
 )
+from uavexp.map_grid import map_grid
 from uavexp.mission.base import Flown
 from uavexp.path_clearance import clearance_ahead_m
 from uavexp.scene import Scene
@@ -96,6 +97,7 @@ class Recorder:
         self.rows = np.empty((steps, _COLUMNS))
         self._step_s = step_s
         self._ticks: list[_Tick] = []
+        self._occupied: list[Int32] = []  # voxels found so, one array per ESDF update
         self._goals_m: list[Float] = []
         self._bodies: list[Bodies] = []  # one per step, if there are any
         self._tracks: list[Tracks] = []  # one per ESDF update
@@ -128,6 +130,7 @@ class Recorder:
         self._ticks.append(
             (observation.time_s, clearance_m, changed, score, remaining_clearance_m(observation))
         )
+        self._occupied.append(observation.update.voxel[observation.update.occupied])
         self._tracks.append(observation.tracks)
         goal = observation.goal
         if goal is not None and not (self._goals_m and np.array_equal(self._goals_m[-1], goal.position_m)):
@@ -174,6 +177,7 @@ class Recorder:
             goals_m=np.array(self._goals_m).reshape(-1, 3),
             seen_share=seen_share,
             mapped_m=field.voxel_centres_m(mapped).astype(np.float32),
+            grid=map_grid(field, mapped, self._occupied, [row[0] for row in self._ticks]),
             movers=_mover_rows(self._bodies, mover_m, len(rows)),
             tracks=_track_rows(self._tracks),
             first_plan=_first_plan(first_plan),

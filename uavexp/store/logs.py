@@ -27,7 +27,7 @@ Arrays = dict[str, npt.NDArray[Any]]
 GROUPS: dict[str, Any] = {
     name: kind for name, kind in get_type_hints(TrialLog).items() if dataclasses.is_dataclass(kind)
 }
-PREFIX = {"movers": "mover_", "tracks": "track_", "first_plan": "plan_"}
+PREFIX = {"grid": "map_", "movers": "mover_", "tracks": "track_", "first_plan": "plan_"}
 EVENTS = {"replans": Replan, "contacts": Contact}
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # a zip entry must carry a time; this one never changes
 _LEVEL = 1  # of zlib: most of a log is coordinates, which 6 packs by 1 % smaller in three times the time

@@ -27,7 +27,7 @@ from uavexp.paths import PACKAGE, checkout_root
 
 SCHEMA = 2
 RECORD, WALL, LOG, PICTURE = "record.json", "wall.json", "log.npz", "picture.png"
-_ASKING = ("cli", "sweep", "report")  # they ask for flights, run them and show them
+_ASKING = ("cli", "sweep", "report", "export", "show")  # they ask for flights, run them and show them
 
 
 class Status(StrEnum):

@@ -1,0 +1,1 @@
+"""Stored flights for other programs, a module for each format."""

@@ -1,0 +1,46 @@
+"""`python -m uavexp.export TRIAL --to FORMAT`: a stored flight for another program."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from uavexp.errors import UavexpError, one_line
+from uavexp.export.formats import FORMATS, export
+from uavexp.store.stored_trial import read_trial
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Export one trial and return the exit code: 0; 1 the disk was full; 2 bad input; 130 interrupted."""
+    options = _parser().parse_args(arguments)
+    try:
+        trial = read_trial(options.trial)
+        out = options.out or Path(f"{trial.name}.{options.to}{FORMATS[options.to].suffix}")
+        for path in export(trial, options.to, out):
+            sys.stdout.write(f"{path}\n")
+    except UavexpError as error:
+        sys.stderr.write(f"error: {one_line(error)}\n")
+        return error.exit_code
+    except KeyboardInterrupt:
+        sys.stderr.write("interrupted\n")
+        return 130
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m uavexp.export",
+        description="Writes a stored flight for another program; nothing is flown.",
+        epilog="formats:\n" + "\n".join(f"  {name:<8} {item.what}" for name, item in FORMATS.items()),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("trial", type=Path, metavar="TRIAL", help="a trial's folder, e.g. STUDY/trials/NAME")
+    parser.add_argument("--to", required=True, choices=list(FORMATS), help="format")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="default: the trial's name, here")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
