@@ -125,7 +125,7 @@ def _one_by_one(path: Path, body: Body, element: Element, place: int, wanted: Co
             if lengths is not None:
                 length = lengths[place] if place < len(lengths) else -1
                 count = int(length) if 0 <= length <= size else -1
-                if count != length:
+                if count < 0 or count != length:
                     raise _truncated(path, element, row)
             place += count_width
             first.append(place)
