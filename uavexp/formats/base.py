@@ -48,6 +48,7 @@ class Options:
     """What a file may leave open."""
 
     wall_height_m: float = 2.5  # to which a plan is extruded from z = 0
+    unit_m: float | None = None  # length of one unit of the file; None: as the file tells, or 1
     layers: tuple[str, ...] = ()  # of a drawing that are walls; none: all of them
 
 

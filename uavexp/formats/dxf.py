@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import numpy as np
 from ezdxf.enums import InsertUnits
 from ezdxf.filemanagement import readfile
 from ezdxf.path import make_path
-from ezdxf.units import conversion_factor, unit_name
+from ezdxf.units import conversion_factor
 
 from uavexp.arrays import Float
 from uavexp.errors import WorldError
@@ -33,7 +34,7 @@ def read(path: Path, options: Options) -> Content:
     """Return the lines of the model space as thin walls, with floor and ceiling over their bounding box.
 
     `options.layers` says which layers are walls; none: all that are switched on. Coordinates stand
-    as in the drawing; the unit that its header names is a warning.
+    as in the drawing; its unit is the header's ($INSUNITS).
     """
     with path.open("rb") as file:
         file.seek(max(0, path.stat().st_size - _TAIL))
@@ -42,16 +43,18 @@ def read(path: Path, options: Options) -> Content:
     with damaged(path, "dxf"):
         drawing = readfile(path)
         walls = _walls(path, drawing, options.layers)
+        unit_m = _unit_m(drawing)
         lines, layers, left = _lines(path, drawing, walls, bool(options.layers))
     if not lines:
         raise WorldError(
             f"world file {path} holds no {' '.join(LINES)} on the layers {' '.join(sorted(walls))}"
         )
-    height = options.wall_height_m
+    height = options.wall_height_m / (options.unit_m or unit_m or 1.0)  # in the drawing's unit
     corners = np.concatenate(lines)
     floor = prism.rectangle(corners.min(axis=0), corners.max(axis=0))
     surface = prism.joined([prism.walls(lines, height), prism.floor_and_ceiling(floor, height)])
-    return base.mesh(path, "dxf plan", *surface, warnings=tuple(_warnings(drawing, options, layers, left)))
+    content = base.mesh(path, "dxf plan", *surface, warnings=tuple(_warnings(options, layers, left)))
+    return replace(content, unit_m=unit_m)
 
 
 def _walls(path: Path, drawing: Any, asked: tuple[str, ...]) -> set[str]:
@@ -132,15 +135,7 @@ def _polyline(path: Path, entity: Any) -> Float | None:
     return np.array(points, dtype=np.float64)
 
 
-def _warnings(drawing: Any, options: Options, layers: Counter[str], left: Counter[str]) -> Iterator[str]:
-    unit = int(drawing.header.get("$INSUNITS", 0))
-    if unit == 0:
-        yield "the drawing names no unit ($INSUNITS); its coordinates are taken as they stand"
-    elif unit != InsertUnits.Meters:
-        yield (
-            f"the drawing's header says {unit_name(unit)} ($INSUNITS={unit}), its coordinates are taken as "
-            f"they stand: if it is right, world.unit_m={_metres(unit):g}"
-        )
+def _warnings(options: Options, layers: Counter[str], left: Counter[str]) -> Iterator[str]:
     if not options.layers and len(layers) > 1:
         names = ", ".join(f"{name} ({count})" for name, count in sorted(layers.items()))
         yield f"lines of all layers became walls, {names}: world.layers=[...] takes some"
@@ -148,6 +143,10 @@ def _warnings(drawing: Any, options: Options, layers: Counter[str], left: Counte
         yield "left out: " + ", ".join(f"{count} {kind}" for kind, count in sorted(left.items()))
 
 
-def _metres(unit: int) -> float:
-    """Length of one $INSUNITS."""
-    return conversion_factor(InsertUnits(unit), InsertUnits.Meters)
+def _unit_m(drawing: Any) -> float | None:
+    """Length of the unit that the drawing's header names; None: it names none."""
+    try:
+        unit = InsertUnits(int(drawing.header.get("$INSUNITS", 0)))
+    except (TypeError, ValueError):
+        return None
+    return None if unit is InsertUnits.Unitless else conversion_factor(unit, InsertUnits.Meters)

@@ -36,7 +36,7 @@ def read(path: Path, options: Options) -> Content:
         if not rings or not np.isclose(shapely.area(pieces).sum(), shapely.area(area), rtol=1e-6):
             raise WorldError(f"world file {path} holds no polygon with an area")
         triangles = shapely.get_coordinates(pieces).reshape(-1, 4, 2)[:, :3]
-    height = options.wall_height_m
+    height = options.wall_height_m / (options.unit_m or 1.0)  # in the file's unit
     surface = prism.joined([prism.walls(rings, height), prism.floor_and_ceiling(triangles, height)])
     return base.mesh(path, "wkt plan", *surface, warnings=warnings)
 

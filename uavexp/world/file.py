@@ -70,8 +70,7 @@ class File:
 
     def survey(self) -> Survey:
         """Return the building; raise `WorldError` in one line when the file is unusable."""
-        # a reader's lengths are the file's own
-        options = formats.Options(wall_height_m=self.wall_height_m / (self.unit_m or 1.0), layers=self.layers)
+        options = formats.Options(wall_height_m=self.wall_height_m, unit_m=self.unit_m, layers=self.layers)
         content = formats.read(Path(self.path), options)
         building = building_of(content, self._reading(content))
         bounds_m = self._checked_bounds(building)

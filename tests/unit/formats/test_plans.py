@@ -169,14 +169,15 @@ def test_layers_are_chosen_and_others_told(tmp_path: Path) -> None:
 
     path = drawn(tmp_path / "a.dxf", draw, unit=4)
     content = read(path, Options(wall_height_m=HEIGHT))
-    assert areas(content)[0] == pytest.approx(24 * HEIGHT)
+    assert areas(content)[0] == pytest.approx(24 * HEIGHT * 1000)
+    assert content.unit_m == 0.001
     told = "; ".join(content.warnings)
-    assert "0.001" in told  # m, of a millimetre
     assert "doors (1), loose (1), walls (1)" in told
     assert "1 TEXT" in told
     assert "1 on layer old" in told
-    chosen = read(path, Options(wall_height_m=HEIGHT, layers=("Walls",)))
-    assert areas(chosen)[0] == pytest.approx(20 * HEIGHT)
+    chosen = read(path, Options(wall_height_m=HEIGHT, layers=("Walls",), unit_m=0.01))
+    assert areas(chosen)[0] == pytest.approx(20 * HEIGHT * 100)
+    assert chosen.warnings == ("left out: 1 TEXT",)
     with pytest.raises(WorldError, match=r"no layer windows; its layers are .*walls"):
         read(path, Options(layers=("windows",)))
 
@@ -228,7 +229,7 @@ def test_published_drawings_have_as_long_walls_as_their_lines(path: Path) -> Non
             length += np.linalg.norm(
                 np.diff(points, axis=0, append=points[:1] if closed else points[-1:]), axis=1
             ).sum()
-    content = read(path, Options(wall_height_m=1.0, layers=tuple(layers)))
+    content = read(path, Options(wall_height_m=1.0, unit_m=1.0, layers=tuple(layers)))
     assert areas(content)[0] == pytest.approx(length, rel=0.01)
 
 

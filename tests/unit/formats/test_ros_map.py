@@ -96,6 +96,7 @@ def test_every_kind_of_pixel_is_read(tmp_path: Path, mode: str, kind: str) -> No
         plain([[0, 254], [205, 0]]),
         b"P2 2 2 255 0 254 # the far row\n205 # near\n0",
         b"P5\n# of a camera\n2 2\n255\n\x00\xfe\xcd\x00",
+        plain([[0, 100], [80, 0]], 100),
         b"P5 2 2 65535\n\x00\x00\xfe\xfe\xcd\xcd\x00\x00",
     ],
 )

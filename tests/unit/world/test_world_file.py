@@ -181,6 +181,22 @@ def test_ros_map_is_extruded_where_its_origin_and_yaw_say(tmp_path: Path, unknow
     assert (hit == pytest.approx(2.0, abs=1e-5)) == (unknown == "wall")
 
 
+def test_a_drawing_in_millimetres_is_the_same_world(tmp_path: Path) -> None:
+    ezdxf = pytest.importorskip("ezdxf")
+    worlds = []
+    for unit, code, given in ((1.0, 6, None), (0.001, 4, None), (0.001, 0, 0.001)):
+        drawing = ezdxf.new()
+        drawing.header["$INSUNITS"] = code
+        corners = np.array([[0.0, 0.0], [8.0, 0.0], [8.0, 6.0], [0.0, 6.0]]) / unit
+        drawing.modelspace().add_lwpolyline(corners.tolist(), close=True)
+        drawing.saveas(tmp_path / f"{code}.dxf")
+        worlds.append(read(tmp_path / f"{code}.dxf", unit_m=given))
+    for world in worlds[1:]:
+        np.testing.assert_allclose(world.vertices_m, worlds[0].vertices_m, atol=1e-6)
+    assert worlds[0].vertices_m[:, 2].max() == 2.5
+    assert any("0.001" in note for note in worlds[1].notes)
+
+
 def bad_files() -> dict[str, tuple[bytes, str]]:
     """Damaged versions of each format, and the word its error must hold."""
     names = ("flat.ply", "flat.stl", "flat.glb", "flat.obj", "flat.pcd", "flat_voxels.npz")
