@@ -41,7 +41,7 @@ from uavexp.vehicle.base import Vehicle
 from uavexp.vehicle.contact import ContactTracker
 from uavexp.world.base import WorldGenerator
 
-Progress = Callable[[float, str], None]  # simulated time s, a few words
+Progress = Callable[[float, str], None]  # simulated time s, a few words; NaN: a note of the world
 _LOOK_STEPS = 100  # steps between two looks at whether the vehicle still moves
 _STILL_M = 0.3  # moved less in `stuck_s`: stuck
 
@@ -111,7 +111,7 @@ def fly_trial(parts: Parts, seed: int, progress: Progress | None = None) -> tupl
     Args:
         parts: freshly built components.
         seed: the trial's seed, >= 0.
-        progress: called about once a simulated second.
+        progress: called about once a simulated second, and before with each of the world's notes.
 
     Returns:
         The world and the log of the flight.
@@ -121,6 +121,9 @@ def fly_trial(parts: Parts, seed: int, progress: Progress | None = None) -> tupl
         ConfigError: a part drew from a global generator.
     """
     world = make_world(parts, seed)
+    if progress is not None:
+        for note in world.notes:
+            progress(math.nan, note)
     return world, fly(parts, world, seed, progress)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Iterator, Sequence
@@ -45,6 +46,7 @@ class Terminal:
         self._console = console or Console(highlight=False, markup=False, soft_wrap=True)
         self._bar: Progress | None = None
         self._lock = threading.Lock()  # flights report from several threads
+        self._notes: set[str] = set()  # of the worlds, that were said
         self._total = self._done = self._successes = 0
         self._begin_s = self._last_s = time.monotonic()
 
@@ -82,7 +84,13 @@ class Terminal:
         self._bar = None
 
     def watch(self, job: Job, time_s: float, words: str) -> None:
-        """Note the progress of one flight."""
+        """Note the progress of one flight; before it (NaN) say once what is noted of its world."""
+        if math.isnan(time_s):
+            with self._lock:
+                if words not in self._notes:
+                    self._notes.add(words)
+                    self.say(f"note: {words}")
+            return
         line = f"{job.label}: {time_s:.0f} s flown, {words}"
         with self._lock:
             if self._bar is not None:

@@ -25,7 +25,7 @@ class Audience(Protocol):
         """Follow the trials that are left while the block runs."""
 
     def watch(self, job: Job, time_s: float, words: str) -> None:
-        """Note the progress of one flight; called from several threads."""
+        """Note the progress of one flight, or at NaN s a note of its world; called from several threads."""
 
     def finished(self, done: Done) -> None:
         """Note that one trial has ended."""
