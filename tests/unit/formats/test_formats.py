@@ -34,7 +34,8 @@ def test_a_suffix_of_any_case_is_the_same(tmp_path: Path) -> None:
 def test_a_library_that_is_not_installed_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "plan.dxf").write_text("0\nEOF\n")
     monkeypatch.delitem(sys.modules, "uavexp.formats.dxf", raising=False)
-    monkeypatch.setitem(sys.modules, "ezdxf", None)  # as where it is missing
+    for name in ["ezdxf", *(name for name in sys.modules if name.startswith("ezdxf."))]:
+        monkeypatch.setitem(sys.modules, name, None)  # as where it is missing
     with pytest.raises(WorldError, match=r"reading \.dxf needs ezdxf: pip install 'uavexp\[formats\]'"):
         read(tmp_path / "plan.dxf")
 
