@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import argparse
 import os
-import signal
 import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
 from uavexp import __version__
 from uavexp.errors import ConfigError, UavexpError, one_line
+from uavexp.interrupts import leave_at_once
 
 
 class _Parser(argparse.ArgumentParser):
@@ -24,9 +24,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     0; 1 a trial did not run to its end or the disk was full; 2 bad input; 130 interrupted.
     """
     os.environ["MPLBACKEND"] = "Agg"
-    # a job started with & ignores SIGINT, and SIGTERM would lose the table of what has flown
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.default_int_handler)
+    leave_at_once()
     try:
         return _run(sys.argv[1:] if arguments is None else arguments)
     except UavexpError as error:

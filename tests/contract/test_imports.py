@@ -13,7 +13,7 @@ from uavexp.paths import PACKAGE
 
 # a module may import modules of lower layers; within a layer, freely where it says so
 LAYERS = (
-    {"arrays", "errors", "kernel_cache", "memory"},
+    {"arrays", "errors", "interrupts", "kernel_cache", "memory"},
     {"field", "space", "trajectory", "pace", "seeding", "paths", "geometry", "o3d"},
     {"types", "scan", "log", "causes", "parameters", "map_change", "path_clearance"},
     {"braking", "triangle_grid", "bodies", "scene", "formats"},

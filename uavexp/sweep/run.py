@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
+import signal
 from collections.abc import Generator, Sequence
 from functools import partial
 from pathlib import Path
@@ -11,6 +12,7 @@ from pathlib import Path
 from uavexp.config.composition import CommandLine
 from uavexp.errors import ConfigError, RecordError, UavexpError, one_line
 from uavexp.flight import fly_cell
+from uavexp.interrupts import raise_from_now_on
 from uavexp.store.folder import folder_of, opened, put_trial, put_world, remove_unfinished, set_aside
 from uavexp.store.history import FLYING, Run
 from uavexp.store.records import Status, canonical_json, write_text
@@ -18,6 +20,7 @@ from uavexp.store.study import STUDY, collect, study_text
 from uavexp.sweep import kernels
 from uavexp.sweep.agenda import Agenda, agenda_of
 from uavexp.sweep.audience import Audience
+from uavexp.sweep.child import die_with_parent
 from uavexp.sweep.dask import run_dask
 from uavexp.sweep.head_start import PRELOAD
 from uavexp.sweep.job import Done, Job
@@ -68,6 +71,7 @@ def _prepare(agenda: Agenda, runner: Runner, audience: Audience) -> None:
 
 
 def _fly_agenda(agenda: Agenda, command: CommandLine, audience: Audience, run: Run, runner: Runner) -> int:
+    raise_from_now_on()
     folder, kept, failed = agenda.study.folder, 0, 0
     checks = _world_checks(agenda)
     unchecked, waiting = len(checks), list[Done]()
@@ -186,6 +190,9 @@ def _compile_kernels(job: Job) -> None:
 
 
 def _warm_up(trial: TrialJob) -> None:
+    die_with_parent()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the terminal's Ctrl-C is the parent's to handle
+
     def stop(time_s: float, _: str) -> None:
         if time_s >= _WARM_UP_S:
             raise SystemExit

@@ -1,0 +1,35 @@
+"""Ctrl-C is one line, from the moment on at which a command can hear it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.sweeps import QUICK, begin
+
+
+def wait_until_it_hears(process: subprocess.Popen[str]) -> None:
+    """Until SIGTERM, which Python itself leaves alone, has a handler."""
+    status = Path(f"/proc/{process.pid}/status")
+    while process.poll() is None:
+        caught = next(line for line in status.read_text().splitlines() if line.startswith("SigCgt"))
+        if int(caught.split()[1], 16) >> (signal.SIGTERM - 1) & 1:
+            return
+        time.sleep(0.002)
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="reads /proc")
+@pytest.mark.parametrize("delay_s", [0.0, 0.1, 0.25, 0.5, 0.8, 1.2, 1.7, 2.3])
+def test_an_interrupt_of_a_whole_group_is_one_line(delay_s: float, tmp_path: Path) -> None:
+    """Within an import it came out as a missing library, or as a class that cannot be made."""
+    process = begin(*QUICK, "seed=0:3", f"out={tmp_path / 'out'}")
+    wait_until_it_hears(process)
+    time.sleep(delay_s)
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: the fork server and the children, too
+    _, error = process.communicate(timeout=60)
+    assert (process.returncode, error) == (130, "interrupted\n")

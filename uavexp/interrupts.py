@@ -1,0 +1,31 @@
+"""Ctrl-C and SIGTERM are one line, at any moment of a command."""
+
+from __future__ import annotations
+
+import os
+import signal
+from types import FrameType
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)  # SIGTERM would lose the table of what has flown
+
+
+def leave_at_once() -> None:
+    """Until something is begun that must be ended well, a signal ends the process itself.
+
+    An exception would not do: raised inside an import, it comes out as something else (a missing
+    library, a class that cannot be made). A job started with & ignores SIGINT: not so here.
+    """
+    for number in _SIGNALS:
+        signal.signal(number, _leave)
+
+
+def raise_from_now_on() -> None:
+    """Something is begun: a signal raises `KeyboardInterrupt`, if `leave_at_once` was called before."""
+    for number in _SIGNALS:
+        if signal.getsignal(number) is _leave:
+            signal.signal(number, signal.default_int_handler)
+
+
+def _leave(number: int, frame: FrameType | None) -> None:
+    os.write(2, b"interrupted\n")
+    os._exit(130)
