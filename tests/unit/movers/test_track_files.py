@@ -211,6 +211,12 @@ def test_faults_are_named(tmp_path: Path, name: str, text: str, says: str) -> No
     assert name in str(told.value)
 
 
+def test_more_rows_than_memory_is_meant_for_are_refused_before_they_are_read(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("t_s,id,x_m,y_m\n" + "0\n" * 2_001_000)
+    with pytest.raises(WorldError, match=r"a\.csv: more than 2000000 rows; cut the recording"):
+        read(tmp_path / "a.csv")
+
+
 def test_a_rate_for_a_file_with_times_is_refused(tmp_path: Path) -> None:
     as_csv(tmp_path / "people.csv")
     with pytest.raises(WorldError, match="frame_rate_hz does not apply"):

@@ -40,7 +40,7 @@ def read(path: Path, options: Options | None = None) -> dict[str, Float]:
         if not path.is_file():
             raise WorldError(f"movers.path {path} cannot be read: no such file")
         if path.stat().st_size > MOST_BYTES:
-            raise WorldError(f"{path}: more than {MOST_BYTES // 2**30} GiB; cut the recording")
+            raise WorldError(f"{path}: more than {MOST_BYTES // 2**20} MiB; cut the recording")
         return tracks_of(reader(path), path, given)
     except OSError as error:
         raise WorldError(f"movers.path {path} cannot be read: {error}") from error

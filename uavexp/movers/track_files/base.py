@@ -12,8 +12,9 @@ import numpy as np
 from uavexp.arrays import Float
 from uavexp.errors import WorldError
 
-MOST_BYTES = 2**30
-MOST_ROWS = 5_000_000
+MOST_BYTES = 2**29
+MOST_ROWS = 2_000_000  # 1 GiB while they are read
+_LINES_OF_A_HEADER = 1000
 FARTHEST_M = 1e6
 LATEST_S = 1e10  # clocks count seconds since 1970 at most
 
@@ -43,12 +44,20 @@ def text_of(path: Path) -> str:
     """The text of a file, without a byte order mark.
 
     Raises:
-        WorldError: it is no UTF-8 text.
+        WorldError: it is no UTF-8 text, or too long.
     """
     try:
-        return path.read_text(encoding="utf-8-sig")
+        text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         raise WorldError(f"{path} is no UTF-8 text; save it as such") from error
+    check_count(text.count("\n") - _LINES_OF_A_HEADER, path)
+    return text
+
+
+def check_count(rows: int, path: Path) -> None:
+    """Refuse more rows than memory is meant for."""
+    if rows > MOST_ROWS:
+        raise WorldError(f"{path}: more than {MOST_ROWS} rows; cut the recording")
 
 
 def number(value: object, name: str, path: Path, line: int) -> float:
@@ -94,8 +103,7 @@ def tracks_of(recording: Recording, path: Path, options: Options) -> dict[str, F
     rows = recording.rows
     if not rows:
         raise WorldError(f"{path}: no rows")
-    if len(rows) > MOST_ROWS:
-        raise WorldError(f"{path}: {len(rows)} rows, at most {MOST_ROWS} are read; cut the recording")
+    check_count(len(rows), path)
     people = list(dict.fromkeys(row[1] for row in rows))
     number_of = {person: index for index, person in enumerate(people)}
     line = np.array([row[0] for row in rows])
