@@ -150,8 +150,8 @@ def test_a_ros_map_is_the_slice_at_flight_height(noted, tmp_path) -> None:
     voxels = map_voxels(noted.log)
     assert grey.shape == voxels.free.shape[1::-1]
     assert described["origin"][:2] == pytest.approx([-4.0, -3.0])
-    occupied = (255 - grey[::-1].T) / 255 > described["occupied_thresh"]
-    free = (255 - grey[::-1].T) / 255 < described["free_thresh"]
+    occupied = described["occupied_thresh"] < (255 - grey[::-1].T) / 255
+    free = described["free_thresh"] > (255 - grey[::-1].T) / 255
     layer = round((1.2 + 0.2) / SIZE_M - 0.5)
     band = voxels.occupied[:, :, layer - 2 : layer + 2].any(axis=2) | voxels.occupied[:, :, layer + 2]
     assert not (occupied & ~band).any()
