@@ -25,6 +25,7 @@ LAYERS = (
     {"store", "check"},
     {"export"},
     {"report"},
+    {"show"},
     {"sweep"},
     {"cli"},
     {"__main__"},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 import threading
 import time
 from collections.abc import Iterator, Sequence
@@ -21,7 +22,7 @@ from rich.progress import (
 )
 
 from uavexp.cli.summary import cell_table, trial_table
-from uavexp.store.records import PICTURE, read_record
+from uavexp.store.records import LOG, PICTURE, read_record
 from uavexp.store.study import TRIALS
 from uavexp.store.table import pooled_versions
 
@@ -155,6 +156,8 @@ class Terminal:
             self.say(f"repeat:  {jobs[row['trial']].payload.command}")
             if (picture := trials / row["trial"] / PICTURE).exists():
                 self.say(f"picture: {picture}")
+        if any((trials / row["trial"] / LOG).exists() for row in rows):
+            self.say(f"show:    python -m uavexp.show {shlex.quote(str(agenda.study.folder))}")
 
     def _report(self, folder: Path) -> None:
         """Make the report, and print where its files are: tables and figures by their folder."""

@@ -1,0 +1,1 @@
+"""Looking at stored flights: one page that moves, or a film."""
