@@ -16,7 +16,10 @@ def options(group: str) -> list[str]:
 
 
 def build(group: str, option: str, **changes: Any) -> Any:
-    """The component that an option's yaml describes, with the options of its group that it holds."""
+    """The component that an option's yaml describes, with the options of its group that it holds.
+
+    What the yaml takes from the trial (`${unknown}`) is as the class has it.
+    """
     values = OmegaConf.to_container(OmegaConf.load(CONF.joinpath(*group.split("."), f"{option}.yaml")))
     for inner in values.pop("defaults", []):  # risk@policies.risk, find: grid, _self_
         if isinstance(inner, dict):
@@ -27,4 +30,5 @@ def build(group: str, option: str, **changes: Any) -> Any:
             continue
         parameter, name = place.split(".")
         values[parameter][name] = build(group, part)
-    return get_class(values.pop("_target_"))(**(values | changes))
+    own = {name: value for name, value in values.items() if not str(value).startswith("${")}
+    return get_class(own.pop("_target_"))(**(own | changes))

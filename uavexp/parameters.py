@@ -71,6 +71,11 @@ Vector = tuple[Finite, Finite, Finite]
 Range = Annotated[tuple[Positive, Positive], Constraint("[least, greatest]", lambda pair: pair[0] <= pair[1])]
 
 
+# What holds everywhere in a trial, named by the key of no group that it is taken from
+NarrowClearance = Annotated[float, between(0, 1)]  # `${narrow_clearance_m}`
+NarrowSpeed = Annotated[float, above(0), at_most(10)]  # `${narrow_speed_mps}`
+
+
 class Unknown(StrEnum):
     """Whether plans may enter space never seen; one word for the whole trial (`${unknown}`)."""
 

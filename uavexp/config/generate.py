@@ -27,8 +27,23 @@ from uavexp.config.build import GROUPS, TARGET, component_class, nested_groups
 from uavexp.config.options import RUNNER_GROUP
 from uavexp.config.trust import VARIABLE, is_trusted
 from uavexp.errors import ConfigError, UavexpError, one_line
-from uavexp.parameters import MISSING, Unknown, is_option, parameter_types, plain
+from uavexp.parameters import (
+    MISSING,
+    NarrowClearance,
+    NarrowSpeed,
+    Unknown,
+    is_option,
+    parameter_types,
+    plain,
+)
 from uavexp.paths import PACKAGE, conf_folder
+
+# parameters that hold everywhere in a trial, by their type, and the key in conf/config.yaml
+_SHARED = (
+    (Unknown, "unknown"),
+    (NarrowClearance, "narrow_clearance_m"),
+    (NarrowSpeed, "narrow_speed_mps"),
+)
 
 
 def option_files() -> dict[Path, str]:
@@ -78,8 +93,9 @@ def _held(cls: type) -> dict[str, str]:
 
 
 def _default(cls: type, item: dataclasses.Field[Any]) -> str:
-    if parameter_types(cls)[item.name] is Unknown:
-        return "${unknown}"  # the trial's
+    shared = [name for kind, name in _SHARED if parameter_types(cls)[item.name] == kind]
+    if shared:
+        return f"${{{shared[0]}}}"  # the trial's
     if item.default_factory is not dataclasses.MISSING:
         return _scalar(item.default_factory())
     return MISSING if item.default is dataclasses.MISSING else _scalar(item.default)

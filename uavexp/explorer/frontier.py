@@ -41,7 +41,7 @@ from uavexp.explorer.planar import (
 )
 from uavexp.explorer.view import KNOWN, Passage, Plane, prices, straight
 from uavexp.mapping.projection import Band
-from uavexp.parameters import Count, NonNegative, Positive, Unknown, Whole, between, option
+from uavexp.parameters import Count, NarrowClearance, NonNegative, Positive, Unknown, Whole, between, option
 from uavexp.types import Goal, Limits, Observation
 
 Scalar = TypeVar("Scalar", float, Float)
@@ -73,6 +73,8 @@ class Frontier:
     ascent_step_m: Positive = 0.1  # m, alpha_g of x <- x + alpha_g grad ESDF [ours]
     ascent_steps: Whole = 20  # at most so many ascent steps [ours]
     min_clearance_m: Positive = 0.3  # m, d_min of goals and of cells a path may use [ours]
+    narrow_clearance_m: NarrowClearance = 0.22  # m, of cells, where min_clearance_m leaves no way; 0: never
+    # [ours]
     enough_clearance_m: Positive = 0.6  # m, the ascent stops here [ours]
     cell_m: Positive = 0.15  # m, planar map
     occupied_below_m: Positive = 0.3  # m, planar map: a seen cell is occupied below this clearance,
@@ -95,7 +97,6 @@ class Frontier:
     # it must find its way out [ours]
     set_aside_s: NonNegative = 10.0  # s, visited and unreachable goals are set aside for so long [ours]
     _height_m: float = field(init=False, repr=False, default=0.0)
-    _body_radius_m: float = field(init=False, repr=False, default=0.0)
     _current: Goal | None = field(init=False, repr=False, default=None)
     _aside: list[tuple[float, Float]] = field(init=False, repr=False, default_factory=list)
     _plane: Plane | None = field(init=False, repr=False, default=None)
@@ -111,7 +112,6 @@ class Frontier:
     def reset(self, flight_height_m: float, limits: Limits) -> None:
         """Begin a trial at this flight height."""
         self._height_m = flight_height_m
-        self._body_radius_m = limits.body_radius_m
         self._current, self._plane = None, None
         self._aside, self._passages = [], {}
 
@@ -132,7 +132,7 @@ class Frontier:
         if best is None and kept is None:
             best = self._last_resort(observation)
         if best is None and kept is None:  # a doorway passed before it was mapped may look too narrow
-            clearance_m = min(self._body_radius_m, self.min_clearance_m)
+            clearance_m = min(self.narrow_clearance_m or self.min_clearance_m, self.min_clearance_m)
             best, kept = self._choose(plane, observation, clearance_m, bonus)
         if kept is None or best is not None:
             self._current = best

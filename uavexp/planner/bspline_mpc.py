@@ -32,7 +32,17 @@ from typing import Annotated
 import numpy as np
 
 from uavexp.errors import require
-from uavexp.parameters import Count, NonNegative, Positive, PositiveShare, Unknown, between, option
+from uavexp.parameters import (
+    Count,
+    NarrowClearance,
+    NarrowSpeed,
+    NonNegative,
+    Positive,
+    PositiveShare,
+    Unknown,
+    between,
+    option,
+)
 from uavexp.planner.constraints import Constraints
 from uavexp.planner.find.base import Finder
 from uavexp.planner.find.grid import Grid
@@ -42,6 +52,7 @@ from uavexp.planner.mpc.follow import SLACK_M, Followed, Follower, least_room_m
 from uavexp.planner.mpc.guide import Guide, StaticPlanner, still_holds
 from uavexp.planner.mpc.horizon import horizon_model
 from uavexp.planner.shape.static_spline import StaticSpline
+from uavexp.planner.shape.stop_first import summed
 from uavexp.types import Limits, PlanRequest, PlanResult, PlanStatus, Tracks
 
 
@@ -91,6 +102,8 @@ class BsplineMpc:
     # s; 0: movers do not count [ours]
     turn_share: PositiveShare = 0.5  # of the body rate limit, with which the horizon turns the thrust; the
     # rest is left to the controller and the yaw [ours]
+    narrow_clearance_m: NarrowClearance = 0.22  # m, tried where min_clearance_m finds no way; 0: never [ours]
+    narrow_speed_mps: NarrowSpeed = 1.0  # m/s, of such a plan, and at most of the vehicle then [ours]
     slackened: int = field(default=0, init=False)  # requests at which the horizon gave way
     braked: int = field(default=0, init=False)  # requests at which only coming to rest was left
     _follower: Follower | None = field(default=None, init=False, repr=False)
@@ -137,6 +150,18 @@ class BsplineMpc:
         follower = self._follower
         if follower is None:
             raise RuntimeError("plan() needs reset() first")
+        result, constraints = self._plan(request, follower), follower.static.constraints
+        narrow = constraints.narrowed(result, request, self.narrow_clearance_m, self.narrow_speed_mps)
+        if narrow is None:
+            return result
+        static = replace(follower.static, constraints=narrow)
+        slow = replace(follower.limits, max_speed_mps=narrow.limits.max_speed_mps)
+        return summed(
+            result, self._plan(request, replace(follower, static=static, limits=slow)), "a narrow place"
+        )
+
+    def _plan(self, request: PlanRequest, follower: Follower) -> PlanResult:
+        """`plan` by this follower."""
         state = (request.position_m, request.velocity_mps, request.acceleration_mps2)
         if not all(np.isfinite(part).all() for part in (*state, request.goal.position_m)):
             return PlanResult(status=PlanStatus.LIMITS, reason="start or goal is not finite")

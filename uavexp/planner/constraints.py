@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from uavexp.arrays import Float
-from uavexp.types import Limits, PlanRequest
+from uavexp.types import Limits, PlanRequest, PlanResult, PlanStatus
 
+_FOR_ROOM = (PlanStatus.START_BLOCKED, PlanStatus.GOAL_BLOCKED, PlanStatus.NO_PATH, PlanStatus.NOT_CLEAR)
+_SPARE = 1.05  # of the lesser speed, at which the vehicle may be when it is asked for
 _START_SLACK_M = 0.01  # by which a start below the hard limit may come closer still
 
 
@@ -21,6 +23,16 @@ class Constraints:
     safe_clearance_m: float  # beyond it nothing is gained
     z_band_m: float  # the heights between start and goal may be left by this much
     known_only: bool  # unknown space is closed
+
+    def narrowed(
+        self, failed: PlanResult, request: PlanRequest, clearance_m: float, speed_mps: float
+    ) -> Constraints | None:
+        """A lesser clearance at a lesser speed, for where these found no way; None: it would not help."""
+        too_fast = float(np.linalg.norm(request.velocity_mps)) > _SPARE * speed_mps
+        if failed.status not in _FOR_ROOM or too_fast or not 0.0 < clearance_m < self.min_clearance_m:
+            return None
+        limits = replace(self.limits, max_speed_mps=min(speed_mps, self.limits.max_speed_mps))
+        return replace(self, min_clearance_m=clearance_m, limits=limits)
 
     def shortfall(self, request: PlanRequest, points_m: Float) -> str:
         """Say where a curve through points (P, 3) from the request's start is not clear; "" when it is.

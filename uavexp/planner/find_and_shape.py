@@ -24,7 +24,7 @@ import numpy as np
 
 from uavexp.braking import REST_MPS, braking_trajectory
 from uavexp.errors import require
-from uavexp.parameters import NonNegative, Positive, Unknown
+from uavexp.parameters import NarrowClearance, NarrowSpeed, NonNegative, Positive, Unknown
 from uavexp.planner.constraints import Constraints
 from uavexp.planner.find.base import Finder, FoundPath
 from uavexp.planner.movers.escape import safest_stop
@@ -65,6 +65,8 @@ class FindAndShape:
     # trigger.margin_m of risk is the same [ours]
     mover_horizon_s: NonNegative = 2.0  # s, predictions count for so long; stopping from 2.5 m/s takes as
     # long; 0: movers do not count [ours]
+    narrow_clearance_m: NarrowClearance = 0.22  # m, tried where min_clearance_m finds no way; 0: never [ours]
+    narrow_speed_mps: NarrowSpeed = 1.0  # m/s, of such a plan, and at most of the vehicle then [ours]
     _constraints: Constraints | None = field(default=None, init=False, repr=False)
     _rng: np.random.Generator = field(init=False, repr=False)
     _drawn_from: Mapping[str, Any] = field(init=False, repr=False)  # state of `_rng` at every request
@@ -90,7 +92,12 @@ class FindAndShape:
         """Return a trajectory or the reason why there is none (`Planner.plan`)."""
         if self._constraints is None:
             raise RuntimeError("plan() needs reset() first")
-        constraints = self._constraints
+        result = self._plan(request, self._constraints)
+        narrow = self._constraints.narrowed(result, request, self.narrow_clearance_m, self.narrow_speed_mps)
+        return result if narrow is None else summed(result, self._plan(request, narrow), "a narrow place")
+
+    def _plan(self, request: PlanRequest, constraints: Constraints) -> PlanResult:
+        """`plan` within these constraints."""
         limits, movers = constraints.limits, self._moving(request, constraints.limits)
         refused = _refusal(request, limits)
         if refused is not None:

@@ -2,7 +2,7 @@
 
 A place is verified where every voxel of the body's upright cylinder was seen and the mapped distance
 keeps the body's radius and `margin_m`; where it keeps `narrow_clearance_m` only, it is flown at
-`narrow_mps` at most. What is flown of a plan is its way at a pace (`uavexp.pace`) that comes to rest
+`narrow_speed_mps` at most. What is flown of a plan is its way at a pace (`uavexp.pace`) that comes to rest
 before the first place that is not verified. After every ESDF update the pace is made anew from the
 present one; where the way is seen for a stopping distance and more, that is the plan as planned,
 else the speed falls along the way long before its end, at `comfort_share` of the acceleration limit.
@@ -45,7 +45,16 @@ from uavexp.arrays import Bool, Float
 from uavexp.braking import jerk_mps3
 from uavexp.errors import require
 from uavexp.pace import pace_over
-from uavexp.parameters import NonNegative, Positive, PositiveShare, above, at_most, option
+from uavexp.parameters import (
+    NarrowClearance,
+    NarrowSpeed,
+    NonNegative,
+    Positive,
+    PositiveShare,
+    above,
+    at_most,
+    option,
+)
 from uavexp.safety.base import Flyable, Guard
 from uavexp.safety.looked_at import look_at
 from uavexp.safety.speed_profile import Effort, Way, fastest_rates
@@ -72,8 +81,8 @@ class Committed:
     reaction_s: NonNegative = 0.4  # s, slowing begins so much earlier: the thrust has to be turned
     # around [ours]
     turn_share: PositiveShare = 0.3  # of the body rate limit, with which the thrust is turned for it [ours]
-    narrow_clearance_m: NonNegative = 0.22  # m, clearance of narrow places, which are flown slowly [ours]
-    narrow_mps: Positive = 1.0  # m/s, in narrow places [ours]
+    narrow_clearance_m: NarrowClearance = 0.22  # m, clearance of narrow places, which are flown slowly [ours]
+    narrow_speed_mps: NarrowSpeed = 1.0  # m/s, in narrow places [ours]
     creep_mps: NonNegative = 0.3  # m/s, out of a place whose surroundings were not seen [ours]
     stop_error_m: Positive = 0.25  # m, tracking error at which time stands; from half of it on it runs
     # slower [ours]
@@ -185,7 +194,7 @@ class _Commitment:
         creeps = _leading(~seen) & centre & (ahead.along_m <= 2.0 * radius_m)
         verified = (~near | leaves) & (seen | creeps)
         verified[ahead.along_m <= _HERE_M] = True
-        bound_mps = np.where(clearance_m < wide_m, rules.narrow_mps, np.inf)
+        bound_mps = np.where(clearance_m < wide_m, rules.narrow_speed_mps, np.inf)
         bound_mps[creeps] = np.minimum(bound_mps[creeps], rules.creep_mps)
         return verified, bound_mps
 

@@ -137,7 +137,7 @@ def test_a_narrow_place_is_flown_slowly_and_no_narrower_one_at_all() -> None:
         clearance_m = field.distance_m(at_m)
         narrow = clearance_m < LIMITS.body_radius_m + rules.margin_m
         assert narrow.any() == (gap_m == 0.5)
-        assert velocity[narrow, 0].max(initial=0.0) <= 1.15 * rules.narrow_mps
+        assert velocity[narrow, 0].max(initial=0.0) <= 1.15 * rules.narrow_speed_mps
         assert clearance_m.min() >= 0.21
 
 
