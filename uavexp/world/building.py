@@ -55,8 +55,11 @@ def building_of(content: Content, reading: Reading) -> Building:
     if cells is not None:
         cells = frame.upright(cells)
         points = corners_of(cells)
+    elif len(content.points):
+        points = frame.turned(content.points)
     else:
-        points = frame.turned(content.points if len(content.points) else content.vertices)
+        surface, triangles = _surface(content)
+        points = frame.turned(surface)
     origin_m = frame.origin_m(points)
     bounds_m = None if reading.bounds_m is None else reading.bounds_m - origin_m
     _check_size(points - origin_m, bounds_m, frame)
@@ -66,7 +69,7 @@ def building_of(content: Content, reading: Reading) -> Building:
     elif len(content.points):
         vertices, triangles, space = _of_points(points - origin_m, reading, bounds_m)
     else:
-        vertices, triangles = (points - origin_m).astype(np.float32), content.triangles
+        vertices = (points - origin_m).astype(np.float32)
         space = space_of_mesh(vertices, triangles, bounds_m)
     return Building(
         vertices_m=vertices,
@@ -76,6 +79,14 @@ def building_of(content: Content, reading: Reading) -> Building:
         unit_m=frame.unit_m,
         notes=(*content.warnings, *frame.notes(content), *_notes(cells, reading, origin_m)),
     )
+
+
+def _surface(content: Content) -> tuple[Float, Int32]:
+    """The mesh without vertices of no triangle, which may lie anywhere."""
+    is_used = np.zeros(content.vertices.shape[0], dtype=np.bool_)
+    is_used[content.triangles] = True
+    place = (np.cumsum(is_used) - 1).astype(np.int32)
+    return content.vertices[is_used], place[content.triangles]
 
 
 def _check_size(points_m: Float, bounds_m: Float | None, frame: Frame) -> None:

@@ -116,6 +116,24 @@ def test_unit_and_axis_are_those_that_the_file_names_unless_given(tmp_path: Path
     assert not [note for note in flat.notes if "read with" in note]
 
 
+def test_vertices_of_no_triangle_are_no_part_of_the_world(tmp_path: Path) -> None:
+    text = (DATA / "flat.obj").read_text()
+    (tmp_path / "m.obj").write_text(f"v 5000 0 0\n{shifted(text)}v 0 -5000 0\n")
+    options = {"flight_bounds_m": None}
+    assert read(tmp_path / "m.obj", **options).digest == read(DATA / "flat.obj", **options).digest
+
+
+def shifted(text: str) -> str:
+    """An obj file's faces, each index one higher."""
+    lines = [line.split() for line in text.splitlines()]
+    return "".join(
+        f"f {' '.join(str(int(word) + 1) for word in words[1:])}\n"
+        if words[:1] == ["f"]
+        else " ".join(words) + "\n"
+        for words in lines
+    )
+
+
 def test_voxel_faces_enclose_exactly_the_voxels() -> None:
     rng = np.random.default_rng(0)
     occupied = rng.random((9, 7, 6)) < 0.4
