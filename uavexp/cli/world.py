@@ -43,7 +43,7 @@ Reads a building, says what was understood of it, draws a picture; nothing flies
   --out PICTURE.png         where the picture goes; default: FILE's name with .world.png, here
 All parameters of a file's world: python -m uavexp --help world
 """
-_WIDEST_M = 2.0  # beyond this clearance a bottleneck is not looked for
+_WIDEST_M = 1.0  # beyond this clearance a bottleneck is not looked for
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -186,7 +186,8 @@ def facts_of(understood: Understood) -> list[str]:
             f"start {text(world.start_m)}, target {text(world.target_m)}: "
             f"{world.difficulty.straight_line_m:.1f} m straight, shortest path "
             f"{world.difficulty.shortest_path_m:.1f} m, least clearance on the widest way "
-            f"{understood.bottleneck_m:.2f} m"
+            + ("more than " if understood.bottleneck_m > _WIDEST_M else "")
+            + f"{min(understood.bottleneck_m, _WIDEST_M):.2f} m"
         )
     return lines
 

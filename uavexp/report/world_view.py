@@ -79,7 +79,8 @@ def draw(shown: Shown, title: str, facts: Sequence[str], warnings: Sequence[str]
         states = _draw_section(plan, shown, (along, 1 - along)) | _draw_section(side, shown, (along, 2))
         plan.set_title(f"plan at z = {shown.middle_m[2]:.2f} m", loc="left", fontsize=8)
         across = "xy"[1 - along]
-        side.set_title(f"section at {across} = {shown.middle_m[1 - along]:.2f} m", loc="left", fontsize=8)
+        where = f"section at {across} = {shown.middle_m[1 - along]:.2f} m; ends and path are projected"
+        side.set_title(where, loc="left", fontsize=8)
         figure.legend(
             handles=_handles(shown, states),
             loc="upper left",

@@ -11,6 +11,7 @@ from uavexp.scene import Scene
 from uavexp.world import task
 
 LATTICE_STEP_M = 0.01  # of the clearances tried on the lattice
+MOST_FINE = 20_000_000  # nodes of the fine lattice; of a larger building the coarser one is searched
 ROUNDS = 60  # of pushing a path away from what is near
 _KNOT_M = 0.02  # between the points of a path that is pushed
 _PUSH_M = 0.02  # in the first round; less in each that follows, none after the last
@@ -34,12 +35,14 @@ def widest_path(
     Returns:
         The path, empty when they are not joined at all, and its clearance, m; proved along all of it.
     """
+    fine = float(np.prod(flight_bounds_m[1] - flight_bounds_m[0])) <= MOST_FINE * task.FINE_CELL_M**3
+    cell_m = task.FINE_CELL_M if fine else task.CELL_M  # the middle is found by the pushing in either
     low, high = 0, math.ceil(enough_m / LATTICE_STEP_M) + 1
     path = np.empty((0, 3))
     while high - low > 1:
         middle = (low + high) // 2
         ends = (start_m, target_m, middle * LATTICE_STEP_M)
-        found = task.lattice_path(scene, flight_bounds_m, *ends, task.FINE_CELL_M)
+        found = task.lattice_path(scene, flight_bounds_m, *ends, cell_m)
         low, high, path = (middle, high, found) if found.shape[0] else (low, middle, path)
     if path.shape[0] == 0:
         return path, 0.0
