@@ -10,6 +10,7 @@ import numpy as np
 
 from uavexp.arrays import Float
 from uavexp.errors import WorldError
+from uavexp.formats.number_text import numbers
 from uavexp.formats.sdf_files import find, model_file
 from uavexp.formats.sdf_poses import placed, pose_matrix
 from uavexp.formats.xml_file import parse
@@ -18,6 +19,7 @@ MAX_MODELS = 100_000
 MAX_DEPTH = 20  # of models in models
 SHOWN = 5  # names that a warning lists
 SHAPES = ("box", "sphere", "ellipsoid", "cylinder", "capsule", "cone", "polyline", "plane", "mesh")
+BY_ORIGIN = "models placed by a frame of their own stand by their origin"
 UNREAD = ("actor", "population", "road")  # elements of a world
 FAR_M = 10_000.0  # from the middle of the others: what fell out of a world that was saved while it ran
 
@@ -81,6 +83,10 @@ class Scene:
             self.note("models that are not static stand where the file puts them", name)
         if element.find("plugin") is not None:
             self.note("models with plugins, which may move them, stand still", name)
+        if element.get("placement_frame"):
+            self.note(BY_ORIGIN, name)
+        if model.state is not None and (numbers(self.path, model.state.findtext("scale", "1")) != 1.0).any():
+            self.note("models that the saved state scales stand unscaled", name)
         if element.find("link/visual") is not None and element.find("link/collision") is None:
             self.note("models that are seen but collide with nothing were not read", name)
         for item in element:
@@ -141,6 +147,8 @@ class Scene:
             if root.find("light") is None:
                 self.note("files hold no model", source.name)
             return
+        if include.find("placement_frame") is not None:
+            self.note(BY_ORIGIN, source.parent.name)
         inner = placed(source, root, element) if pose is None else placed(file, scope, include)
         state = (states or {}).get(include.findtext("name", element.get("name", "")).strip())
         place = matrix @ inner if state is None else pose_matrix(self.path, state.find("pose"))

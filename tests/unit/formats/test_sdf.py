@@ -225,6 +225,11 @@ def test_the_state_of_a_saved_world_is_where_things_stand(tmp_path: Path) -> Non
     check_box(read(tmp_path, world(model() + state)), [-1, -2, 47], [1, 2, 53])
     links = state.replace("</pose>", '</pose><link name="l"><pose>0 0 60 0 0 0</pose></link>')
     check_box(read(tmp_path, world(model() + links)), [-1, -2, 57], [1, 2, 63])
+    scaled = read(tmp_path, world(model() + state.replace("<pose>", "<scale>1 1 2</scale><pose>")))
+    assert scaled.warnings == ("models that the saved state scales stand unscaled: m",)
+    assert (
+        read(tmp_path, world(model() + state.replace("<pose>", "<scale>1 1 1</scale><pose>"))).warnings == ()
+    )
 
 
 def test_a_model_alone_is_read(tmp_path: Path) -> None:
