@@ -25,7 +25,7 @@ from uavexp.vehicle.quadrotor_flatness import attitude_and_rate
 
 
 @nb.njit(cache=True)
-def _feed_forward(
+def feed_forward(
     velocity_mps: Float,
     acceleration_mps2: Float,
     jerk_mps3: Float,
@@ -55,7 +55,7 @@ class Flatness(PositionVelocity):
     def command(self, estimated_state: State, reference: Reference) -> Command:
         """Return thrust, attitude and body rate that lead the state to the reference."""
         wanted = PositionVelocity.command(self, estimated_state, reference)
-        rate = _feed_forward(
+        rate = feed_forward(
             reference.velocity_mps,
             reference.acceleration_mps2,
             reference.jerk_mps3,

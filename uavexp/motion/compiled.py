@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from uavexp.arrays import Float
+from uavexp.controller.flatness import Flatness
 from uavexp.controller.position_velocity import Gains, PositionVelocity
 from uavexp.estimator.perfect import truth
 from uavexp.motion.base import Craft, Ending, Judge
@@ -27,13 +28,15 @@ def compiled_motion(craft: Craft, state: State) -> Compiled | None:
     alone = len(craft.contact.scene.bodies) == 0 and craft.believe is truth
     if (
         type(pilot) is HoldingPilot
-        and type(controller) is PositionVelocity
+        and isinstance(controller, PositionVelocity)
+        and type(controller) in (PositionVelocity, Flatness)
         and type(vehicle) is Quadrotor
         and alone
     ):
         return Compiled(
-            craft=craft, pilot=pilot, gains=controller.gains, vehicle=vehicle, state=state, estimate=state
-        )
+            craft=craft, pilot=pilot, gains=controller.gains, feeds=type(controller) is Flatness,
+            vehicle=vehicle, state=state, estimate=state,
+        )  # fmt: skip
     return None
 
 
@@ -44,6 +47,7 @@ class Compiled:
     craft: Craft
     pilot: HoldingPilot
     gains: Gains
+    feeds: bool  # the body rate forward
     vehicle: Quadrotor
     state: State
     estimate: State
@@ -78,7 +82,7 @@ class Compiled:
         flown, is_near = fly_free(
             vehicle.x, self._before, self._command, self._work, references,
             craft.recorder.rows[first : first + len(references)], first, craft.command_steps, craft.step_s,
-            vehicle.substeps, self.gains, vehicle.plant, vehicle.loop, *craft.contact.free_ball,
+            vehicle.substeps, self.gains, self.feeds, vehicle.plant, vehicle.loop, *craft.contact.free_ball,
         )  # fmt: skip
         return flown, is_near
 

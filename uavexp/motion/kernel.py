@@ -1,4 +1,4 @@
-"""The steps between two ticks as one numba kernel: the position-velocity loop flies the quadrotor."""
+"""The steps between two ticks as one numba kernel: a shipped controller flies the quadrotor."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import math
 import numba as nb
 
 from uavexp.arrays import Float
+from uavexp.controller.flatness import feed_forward
 from uavexp.controller.position_velocity import Gains, thrust_and_attitude
 from uavexp.vehicle.quadrotor import AttitudeLoop, Plant, advance
 
@@ -24,6 +25,7 @@ def fly_free(
     step_s: float,
     substeps: int,
     gains: Gains,
+    feeds: bool,
     plant: Plant,
     loop: AttitudeLoop,
     centre_m: Float,
@@ -43,6 +45,7 @@ def fly_free(
         step_s: of each step.
         substeps: of the quadrotor.
         gains: of the controller.
+        feeds: whether it feeds forward the body rate (`controller.flatness`), or the yaw rate alone.
         plant: the quadrotor's constants.
         loop: its inner loop.
         centre_m: (3,) of the ball in which the vehicle is free.
@@ -61,6 +64,11 @@ def fly_free(
             command[1:5] = attitude
             command[5:7] = 0.0
             command[7] = reference[10]
+            if feeds:
+                command[5:8] = feed_forward(
+                    reference[3:6], reference[6:9], reference[11:14], reference[9], reference[10],
+                    gains.drag_per_m, attitude,
+                )  # fmt: skip
         row[0:10] = x[0:10]
         row[10:13] = x[0:3]
         row[13:16] = reference[0:3]
