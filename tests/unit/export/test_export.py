@@ -15,6 +15,7 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 from PIL import Image
 from rosbags.highlevel import AnyReader
+from scipy.spatial.transform import Rotation
 
 from tests.folders import DATA
 from tests.logs import changed, empty_log, make_log, still_curve
@@ -192,6 +193,13 @@ def test_an_mcap_tells_where_the_vehicle_was_and_what_it_knew(noted, tmp_path) -
 
 def test_an_mcap_tells_every_plan_and_its_cause(flown, tmp_path) -> None:
     found = messages(written(flown, "mcap", tmp_path))
+    at_s, state = found["/state"][90]
+    turned, speed = state.pose.orientation, state.linear_velocity
+    world_mps = Rotation.from_quat([turned.x, turned.y, turned.z, turned.w]).apply(
+        [speed.x, speed.y, speed.z]
+    )
+    row = round(at_s / flown.log.step_s)
+    np.testing.assert_allclose(world_mps, flown.log.steps.velocity_mps[row], atol=1e-9)
     replans = flown.log.replans
     assert [line.name for _, line in found["/causes"]] == [replan.cause for replan in replans]
     assert [at_s for at_s, _ in found["/causes"]] == pytest.approx([replan.time_s for replan in replans])
@@ -229,7 +237,11 @@ def test_a_rosbag_is_read_by_ros_readers(flown, tmp_path) -> None:
     ]
     cloud = found["/map"][-1][1]
     np.testing.assert_array_equal(cloud.data.view("<f4").reshape(-1, 3), flown.log.mapped_m)
-    turned = state.pose.pose.orientation
+    turned, speed = state.pose.pose.orientation, state.twist.twist.linear
+    body = Rotation.from_quat([turned.x, turned.y, turned.z, turned.w])
+    np.testing.assert_allclose(
+        body.apply([speed.x, speed.y, speed.z]), flown.log.steps.velocity_mps[row], atol=1e-9
+    )
     np.testing.assert_allclose(
         [turned.w, turned.x, turned.y, turned.z], flown.log.steps.quaternion_wxyz[row], atol=1e-12
     )

@@ -50,7 +50,7 @@
 
   async function makeView(flight) {
     const box = element(byId("views"), "section", "view");
-    element(box, "h2", "", flight.label);
+    if (data.flights.length > 1) element(box, "h2", "", flight.label);
     element(box, "p", "headline", flight.headline);
     const words = element(box, "p", "now");
     const scene = element(box, "div", "scene"), strip = element(box, "div", "strip");
