@@ -14,8 +14,9 @@ from uavexp.field import DistanceField
 from uavexp.mission.base import Flown
 from uavexp.mission.explore import Explore
 from uavexp.mission.goto import Goto
-from uavexp.recorder import Recorder, seen_share
+from uavexp.recorder import Recorder
 from uavexp.scene import Scene
+from uavexp.seen_share import seen_share
 from uavexp.types import Bodies, Observation, Outcome, Reference, State, World
 from uavexp.world.random_columns import RandomColumns
 
