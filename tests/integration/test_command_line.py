@@ -20,6 +20,7 @@ from uavexp.errors import ConfigError
 from uavexp.metrics.evaluate import evaluate
 from uavexp.paths import PACKAGE, conf_folder
 from uavexp.report.__main__ import main as report
+from uavexp.show.__main__ import main as show
 from uavexp.store.logs import read_log
 from uavexp.store.records import read_record
 from uavexp.store.table import FIRST
@@ -61,7 +62,7 @@ def test_a_command_that_flies_ends_with_its_folder(flown: tuple[Path, Any]) -> N
     folder, done = flown
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
-    assert done.stdout.splitlines()[-1] == str(folder)
+    assert done.stdout.splitlines()[-2:] == [f"show:    python -m uavexp.show {folder}", str(folder)]
     assert {item.name for item in folder.iterdir()} == {
         ".lock", "study.json", "run.json", "trials.parquet", "replans.parquet", "trials", "worlds"
     }  # fmt: skip
@@ -70,6 +71,17 @@ def test_a_command_that_flies_ends_with_its_folder(flown: tuple[Path, Any]) -> N
             "record.json", "log.npz", "wall.json"
         }  # fmt: skip
     assert len(list((folder / "worlds").iterdir())) == 2, "a world for each seed, shared by the strategies"
+
+
+def test_flights_are_shown_as_the_command_said(flown: tuple[Path, Any], tmp_path: Path) -> None:
+    assert show([str(flown[0]), "--out", str(tmp_path / "page.html")]) == 0
+    page = (tmp_path / "page.html").read_text()
+    assert '"label":"mcr"' in page
+    assert '"label":"tbr"' in page
+    assert '"grows":true' in page
+    trial = next((flown[0] / "trials").iterdir())
+    assert show([str(trial), "--out", str(tmp_path / "page.html")]) == 0
+    assert f"seed {read_record(trial)['seed']}" in (tmp_path / "page.html").read_text()
 
 
 def test_pictures_are_drawn_of_failures_of_single_flights_and_on_demand(

@@ -126,9 +126,9 @@ def _draw_flight(pen: Any, plan: _Plan, trial: StoredTrial, time_s: float) -> No
     for item in log.replans:
         if item.time_s <= time_s:
             _dot(pen, plan, item.position_m, 6, cause_named(item.cause).colour)
-    _dot(pen, plan, log.steps.position_m[0], 7, "white")
+    _dot(pen, plan, log.steps.position_m[0], 7, "white", "start")
     if trial.world is not None:
-        _dot(pen, plan, trial.world.target_m, 9, "#F0E442")
+        _dot(pen, plan, trial.world.target_m, 9, "#F0E442", "target")
     _dot(pen, plan, log.steps.position_m[row], 9, _FLOWN)
 
 
@@ -152,9 +152,10 @@ def _draw_clearance(pen: Any, top: int, log: TrialLog, time_s: float) -> None:
     pen.text((10, top + 8), words, fill=_TEXT, font=ImageFont.load_default(18))
 
 
-def _dot(pen: Any, plan: _Plan, place_m: Float, radius: int, colour: str) -> None:
+def _dot(pen: Any, plan: _Plan, place_m: Float, radius: int, colour: str, word: str = "") -> None:
     ((x, y),) = plan.pixels(place_m[None])
     pen.ellipse((x - radius, y - radius, x + radius, y + radius), fill=colour, outline="black", width=2)
+    pen.text((x + radius + 4, y - 9), word, fill=_TEXT, font=ImageFont.load_default(16))
 
 
 def _row(log: TrialLog, time_s: float) -> int:

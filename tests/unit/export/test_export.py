@@ -144,6 +144,17 @@ def test_an_octomap_knows_every_voxel_of_the_map(noted, tmp_path) -> None:
     assert leaves < (voxels.occupied | voxels.free).sum() - 3000, "the block of free space is pruned"
 
 
+def test_our_own_reader_counts_the_octomaps_nodes_and_finds_the_same_cells(noted, tmp_path) -> None:
+    from uavexp.formats import FREE, SOLID, octomap
+    from uavexp.formats.base import Options
+
+    cells = octomap.read(written(noted, "octomap", tmp_path), Options()).cells  # refuses another count
+    voxels = map_voxels(noted.log)
+    assert (cells.state == SOLID).sum() == voxels.occupied.sum()
+    assert (cells.state == FREE).sum() == voxels.free.sum()
+    np.testing.assert_allclose(cells.origin, voxels.origin_m, atol=1e-9)
+
+
 def test_a_ros_map_is_the_slice_at_flight_height(noted, tmp_path) -> None:
     file = written(noted, "nav2map", tmp_path)
     described = yaml.safe_load(file.read_text())

@@ -34,7 +34,7 @@ const camera = (() => {
 
   function fit(low, high) {
     at.middle = low.map((value, k) => (value + high[k]) / 2);
-    at.distance = Math.max(3, 0.9 * Math.hypot(...high.map((value, k) => value - low[k])));
+    at.distance = Math.max(3, 1.05 * Math.hypot(...high.map((value, k) => value - low[k])));
   }
 
   function listen(element, redraw) {
