@@ -118,7 +118,7 @@ class Scene:
         uri = shape.geometry.findtext("uri", "").strip()
         mesh = find(uri, shape.file, self.path)
         if mesh is None or not mesh.is_file():
-            self.note("meshes were not found and are missing from the world", uri)
+            self.note("meshes were not found beside the world or above it, and are missing", uri)
         else:
             self.shapes.append(replace(shape, mesh=mesh))
 
@@ -162,7 +162,7 @@ class Scene:
         if kind == "ground_plane":
             self.shapes.append(Shape(name, Element("plane"), matrix, self.path))
         elif kind != "sun":
-            self.note("models were not found and are missing from the world", name)
+            self.note("models were not found beside the world or above it, and are missing", name)
 
     def drop_far(self) -> None:
         """Leave out shapes that stand far from the others."""

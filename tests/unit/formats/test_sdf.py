@@ -203,12 +203,12 @@ def test_what_was_not_read_is_named(tmp_path: Path) -> None:
     content = read(tmp_path, text)
     assert set(content.warnings) == {
         "models that are not static stand where the file puts them: m",
-        "meshes were not found and are missing from the world: pipe.stl",
+        "meshes were not found beside the world or above it, and are missing: pipe.stl",
         "shapes of the kind heightmap were not read: hills",
         "models that are seen but collide with nothing were not read: picture",
         "models with plugins, which may move them, stand still: robot",
         "models farther than 10000 m from the others were not read: lost",
-        "models were not found and are missing from the world: a, b, c, d, e and 2 more",
+        "models were not found beside the world or above it, and are missing: a, b, c, d, e and 2 more",
         "elements of the kind actor were not read: walker",
     }
     with pytest.raises(WorldError, match=r"holds nothing solid: models were not found .*: a$"):
@@ -300,7 +300,7 @@ def test_a_whole_shop_and_barn_are_read() -> None:
         len(formats.files(SHARED / "gazebo/bookstore/worlds/bookstore.world")) == 1 + 26 + 25
     )  # two more stand in a comment
     assert [text.split(":")[0] for text in shop.warnings] == [
-        "meshes were not found and are missing from the world",  # named in another case
+        "meshes were not found beside the world or above it, and are missing",  # named in another case
         "models farther than 10000 m from the others were not read",  # a book at z = 343,583 m
     ]
     for file in SHARED.glob("gazebo/barn/*.world"):
