@@ -111,6 +111,9 @@ def test_poses_may_be_relative_to_what_stands_beside_them(tmp_path: Path) -> Non
     )
     content = read(tmp_path, world(frames + model(pose='<pose relative_to="f">0 0 7 0 0 0</pose>')))
     check_box(content, [0, 3, 4], [2, 7, 10])
+    turned = frames.replace("0 5 0 0 0 0", "0 5 0 0 0 1.5707963267948966")  # what is ahead of it lies at y
+    content = read(tmp_path, world(turned + model(pose='<pose relative_to="f">0 0 7 0 0 0</pose>')))
+    check_box(content, [-2, 5, 4], [2, 7, 10])
     with pytest.raises(WorldError, match="relative to 'nothing'"):
         read(tmp_path, world(model(pose='<pose relative_to="nothing">0 0 7 0 0 0</pose>')))
     circle = '<frame name="f"><pose relative_to="g"/></frame><frame name="g"><pose relative_to="f"/></frame>'
