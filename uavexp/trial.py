@@ -136,7 +136,7 @@ def make_world(parts: Parts, seed: int) -> World:
     layout = seed if parts.world_seed is None else parts.world_seed
     world = parts.world.generate(generator(layout, Stream.WORLD))
     if world.name == "file" and isinstance(parts.mission, Goto):  # other worlds promise their clearance
-        check_passage(world, parts.planner, parts.explorer, parts.mapping, parts.vehicle.limits)
+        check_passage(world, parts.planner, parts.explorer, parts.mapping)
     return parts.mission.prepare(world, generator(seed, Stream.MISSION))
 
 
