@@ -65,8 +65,8 @@ def check_passage(world: World, planner: Planner, explorer: Explorer, mapping: M
     )
     raise WorldError(
         f"the way from start to target leaves {widest_m:.2f} m on each side at its narrowest place; to keep "
-        f"{enough_m - VOXELS * voxel_m:.2f} m in voxels of {voxel_m:g} m takes {enough_m:.2f} m; pass it with "
-        f"{advice}"
+        f"{enough_m - VOXELS * voxel_m:.2f} m in voxels of {voxel_m:g} m takes {enough_m:.2f} m; pass it "
+        f"with {advice}"
     )
 
 
