@@ -20,6 +20,7 @@ from uavexp.world.widest import widest_path
 
 ABOVE_FLOOR_M = 1.2  # of a drawn start and target, when no height is given
 SAMPLE_ATTEMPTS = 100
+SAME_M = 0.002  # what the clearance of the widest way is told too small
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -116,7 +117,7 @@ def drawn_ends(
 
 
 def joining_path(survey: Survey, start: Float, target: Float) -> Float:
-    """Shortest known path (P, 3) between two places that keeps the survey's clearance.
+    """Shortest known path (P, 3) between two places that keeps the survey's clearance, to `SAME_M`.
 
     Raises:
         WorldError: there is none; it names the clearance at which there is one.
@@ -127,8 +128,8 @@ def joining_path(survey: Survey, start: Float, target: Float) -> Float:
         if path.shape[0] > 0:
             return path
     path, widest_m = widest_path(*asked)
-    if widest_m >= survey.clearance_m:
-        return task.tightened(survey.scene, path, survey.clearance_m)
+    if widest_m >= survey.clearance_m - SAME_M:
+        return task.tightened(survey.scene, path, min(widest_m, survey.clearance_m))
     advice = (
         f"they are joined at {_cut(widest_m, 3):.3f} m: world.clearance_m={_cut(widest_m, 2):g}"
         if widest_m >= 0.01

@@ -137,6 +137,7 @@ def test_a_door_is_passed_at_exactly_half_its_width(tmp_path: Path) -> None:
     ends = {"start_m": (1.0, 3.0, 1.2), "target_m": (9.0, 3.0, 1.2)}
     path = obj(tmp_path, boxes)
     made(path, clearance_m=0.37, **ends)
+    assert made(path, clearance_m=0.375, **ends).difficulty.narrowest_gap_m == pytest.approx(0.75, abs=0.01)
     with pytest.raises(WorldError, match=r"joined at 0\.37\d m: world\.clearance_m=0\.37"):
         made(path, clearance_m=0.38, **ends)
 
