@@ -12,8 +12,8 @@ from tests.folders import DATA
 from uavexp.__main__ import main
 from uavexp.store.study import STUDY, Study, read_study
 
-# a failure in one clone is one in all
-settings.register_profile("same_everywhere", derandomize=True)
+# a failure in one clone is one in all, and a slow machine is none
+settings.register_profile("same_everywhere", derandomize=True, deadline=None)
 settings.load_profile("same_everywhere")
 
 STORED = DATA / "study"
