@@ -155,7 +155,15 @@ def _draw_clearance(pen: Any, top: int, log: TrialLog, time_s: float) -> None:
 def _dot(pen: Any, plan: _Plan, place_m: Float, radius: int, colour: str, word: str = "") -> None:
     ((x, y),) = plan.pixels(place_m[None])
     pen.ellipse((x - radius, y - radius, x + radius, y + radius), fill=colour, outline="black", width=2)
-    pen.text((x + radius + 4, y - 9), word, fill=_TEXT, font=ImageFont.load_default(16))
+    font = ImageFont.load_default(16)
+    fits = x + radius + 4 + font.getlength(word) < pen.im.size[0]  # else it stands on the other side
+    pen.text(
+        (x + radius + 4 if fits else x - radius - 4, y),
+        word,
+        fill=_TEXT,
+        font=font,
+        anchor="lm" if fits else "rm",
+    )
 
 
 def _row(log: TrialLog, time_s: float) -> int:
