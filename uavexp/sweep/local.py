@@ -20,7 +20,7 @@ import warnings
 from collections.abc import Callable, Generator, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from multiprocessing import forkserver
+from multiprocessing import forkserver, resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import ForkServerProcess
 from multiprocessing.reduction import send_handle
@@ -45,7 +45,13 @@ def start_fork_server(preload: Sequence[str] = ()) -> None:
         preload: modules that it imports once, for all children.
     """
     multiprocessing.get_context("forkserver").set_forkserver_preload([_TETHER, *preload])
-    forkserver.ensure_running()
+    resource_tracker.ensure_running()  # else the server starts it, which unblocks the signal
+    # the server inherits the mask: the terminal's Ctrl-C is the supervisor's to handle, right after this
+    ours = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        forkserver.ensure_running()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, ours)
 
 
 def run_local(
