@@ -111,8 +111,10 @@ def test_plan_keeps_its_promises(name: str, data: st.DataObject) -> None:
     assert np.linalg.norm(velocity, axis=1).max() <= LIMITS.max_speed_mps * beyond
     assert np.linalg.norm(acceleration, axis=1).max() <= LIMITS.max_acceleration_mps2 * (1.0 + 1e-6)
     clearance = request.field.distance_m(position)
-    kept = int(np.argmax(clearance >= 0.26))  # a start that is nearer may leave
-    assert clearance[kept:].min() >= 0.25
+    # where the usual clearance finds no way, a lesser one is taken, slowly
+    needed = 0.22 if np.linalg.norm(velocity, axis=1).max() <= 1.0 * beyond else 0.26
+    kept = int(np.argmax(clearance >= needed))  # a start that is nearer may leave
+    assert clearance[kept:].min() >= needed - 0.01
     if "conservative" in name and request.field.observed(position[:1])[0]:
         # planners look every quarter of a voxel: a corner of unknown space may be cut by no more
         inside = position[~request.field.observed(position)]

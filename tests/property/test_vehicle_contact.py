@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from uavexp.geometry import rotation_from_quaternion
 from uavexp.scene import Scene
+from uavexp.space import Space
 from uavexp.types import State
 from uavexp.vehicle.contact import resolve
 
@@ -31,7 +32,9 @@ def plane(normal) -> Scene:
     along = np.cross(normal, aside)
     corners = 10.0 * np.array([aside, along, -aside, -along])
     mesh = SimpleNamespace(
-        vertices_m=corners.astype(np.float32), triangles=np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+        vertices_m=corners.astype(np.float32),
+        triangles=np.array([[0, 1, 2], [0, 2, 3]], np.int32),
+        space=Space.all_free(),
     )
     return Scene(mesh)
 
