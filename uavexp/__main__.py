@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from uavexp import __version__
-from uavexp.errors import ConfigError, UavexpError, one_line
-from uavexp.interrupts import leave_at_once
+from uavexp.errors import ConfigError
+from uavexp.interrupts import exit_code_of, leave_at_once
 
 
 class _Parser(argparse.ArgumentParser):
@@ -25,14 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     os.environ["MPLBACKEND"] = "Agg"
     leave_at_once()
-    try:
-        return _run(sys.argv[1:] if arguments is None else arguments)
-    except UavexpError as error:
-        sys.stderr.write(f"error: {one_line(error)}\n")
-        return error.exit_code
-    except KeyboardInterrupt:
-        sys.stderr.write("interrupted\n")
-        return 130
+    return exit_code_of(lambda: _run(sys.argv[1:] if arguments is None else arguments))
 
 
 def _parse(arguments: Sequence[str]) -> argparse.Namespace:

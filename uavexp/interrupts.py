@@ -1,12 +1,28 @@
-"""Ctrl-C and SIGTERM are one line, at any moment of a command."""
+"""How a command ends: bad input, Ctrl-C and SIGTERM are one line and an exit code, at any moment."""
 
 from __future__ import annotations
 
 import os
 import signal
+import sys
+from collections.abc import Callable
 from types import FrameType
 
+from uavexp.errors import UavexpError, one_line
+
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)  # SIGTERM would lose the table of what has flown
+
+
+def exit_code_of(command: Callable[[], int]) -> int:
+    """Run a command; its own exit code, or 1 or 2 for what the user can mend, or 130 when interrupted."""
+    try:
+        return command()
+    except UavexpError as error:
+        sys.stderr.write(f"error: {one_line(error)}\n")
+        return error.exit_code
+    except KeyboardInterrupt:
+        sys.stderr.write("interrupted\n")
+        return 130
 
 
 def leave_at_once() -> None:

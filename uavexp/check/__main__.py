@@ -7,7 +7,8 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
-from uavexp.errors import ConfigError, UavexpError, one_line
+from uavexp.errors import ConfigError
+from uavexp.interrupts import exit_code_of
 
 _ABOUT = """Which promises of its group an option keeps: python -m uavexp.check planner=mine --config-dir DIR
 
@@ -23,14 +24,7 @@ class _Parser(argparse.ArgumentParser):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Check the options that are named and return the exit code."""
-    try:
-        return _check(_parse(sys.argv[1:] if arguments is None else arguments))
-    except UavexpError as error:
-        sys.stderr.write(f"error: {one_line(error)}\n")
-        return error.exit_code
-    except KeyboardInterrupt:
-        sys.stderr.write("interrupted\n")
-        return 130
+    return exit_code_of(lambda: _check(_parse(sys.argv[1:] if arguments is None else arguments)))
 
 
 def _parse(arguments: Sequence[str]) -> argparse.Namespace:

@@ -22,10 +22,10 @@ from uavexp.arrays import Float
 from uavexp.config.build import build
 from uavexp.config.composition import Composer
 from uavexp.config.overrides import parse_settings, quoted
-from uavexp.errors import ConfigError, UavexpError, WorldError, one_line
+from uavexp.errors import ConfigError, WorldError, one_line
 from uavexp.formats import FREE, SOLID, UNMEASURED
 from uavexp.geometry import polyline_length_m
-from uavexp.interrupts import leave_at_once
+from uavexp.interrupts import exit_code_of, leave_at_once
 from uavexp.seeding import Stream, generator
 from uavexp.types import World
 from uavexp.world.file import File
@@ -74,11 +74,7 @@ def main(typed: Sequence[str]) -> int:
     if not typed or {"-h", "--help"} & set(typed):
         (sys.stdout if typed else sys.stderr).write(_USAGE)
         return 0 if typed else 2
-    try:
-        return _show(_asked(typed))
-    except UavexpError as error:
-        sys.stderr.write(f"error: {one_line(error)}\n")
-        return error.exit_code
+    return exit_code_of(lambda: _show(_asked(typed)))
 
 
 def _asked(typed: Sequence[str]) -> Asked:

@@ -7,25 +7,21 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from uavexp.errors import UavexpError, one_line
 from uavexp.export.formats import FORMATS, export
+from uavexp.interrupts import exit_code_of
 from uavexp.store.stored_trial import read_trial
 
 
 def main(arguments: Sequence[str]) -> int:
     """Export one trial and return the exit code: 0; 1 the disk was full; 2 bad input; 130 interrupted."""
-    options = _parser().parse_args(arguments)
-    try:
-        trial = read_trial(options.trial)
-        out = options.out or Path(f"{trial.name}.{options.to}{FORMATS[options.to].suffix}")
-        for path in export(trial, options.to, out):
-            sys.stdout.write(f"{path}\n")
-    except UavexpError as error:
-        sys.stderr.write(f"error: {one_line(error)}\n")
-        return error.exit_code
-    except KeyboardInterrupt:
-        sys.stderr.write("interrupted\n")
-        return 130
+    return exit_code_of(lambda: _export(_parser().parse_args(arguments)))
+
+
+def _export(options: argparse.Namespace) -> int:
+    trial = read_trial(options.trial)
+    out = options.out or Path(f"{trial.name}.{options.to}{FORMATS[options.to].suffix}")
+    for path in export(trial, options.to, out):
+        sys.stdout.write(f"{path}\n")
     return 0
 
 

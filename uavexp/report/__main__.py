@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from uavexp.errors import UavexpError, one_line
+from uavexp.interrupts import exit_code_of
 
 _USAGE = """usage: python -m uavexp.report DIR [DIR ...] [--pictures]
 
@@ -31,15 +31,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if not names or {"-h", "--help"} & set(names):
         (sys.stdout if names else sys.stderr).write(_USAGE)
         return 0 if names else 2
-    try:
-        for name in names:
-            (_report if len(names) == len(typed) else _draw)(Path(name))
-    except UavexpError as error:
-        sys.stderr.write(f"error: {one_line(error)}\n")
-        return error.exit_code
-    except KeyboardInterrupt:
-        sys.stderr.write("interrupted\n")
-        return 130
+    return exit_code_of(lambda: _make(names, _report if len(names) == len(typed) else _draw))
+
+
+def _make(names: Sequence[str], make: Callable[[Path], None]) -> int:
+    for name in names:
+        make(Path(name))
     return 0
 
 

@@ -9,7 +9,8 @@ import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
 
-from uavexp.errors import ConfigError, RecordError, UavexpError, one_line
+from uavexp.errors import ConfigError, RecordError
+from uavexp.interrupts import exit_code_of
 from uavexp.show.chosen import Chosen, chosen
 from uavexp.show.page import page_html
 from uavexp.store.records import write_bytes
@@ -19,20 +20,16 @@ _PAGE = "show.html"
 
 def main(arguments: Sequence[str]) -> int:
     """Show flights and return the exit code: 0; 1 the disk was full; 2 bad input; 130 interrupted."""
-    options = _parser().parse_args(arguments)
-    try:
-        flights = chosen(options.folder)
-        films = [file for file in (options.gif, options.mp4) if file is not None]
-        for film in films:
-            _write_film(flights, film)
-        if options.out is not None or not films:
-            _write_page(flights, options.out or options.folder / _PAGE, look=options.out is None)
-    except UavexpError as error:
-        sys.stderr.write(f"error: {one_line(error)}\n")
-        return error.exit_code
-    except KeyboardInterrupt:
-        sys.stderr.write("interrupted\n")
-        return 130
+    return exit_code_of(lambda: _show(_parser().parse_args(arguments)))
+
+
+def _show(options: argparse.Namespace) -> int:
+    flights = chosen(options.folder)
+    films = [file for file in (options.gif, options.mp4) if file is not None]
+    for film in films:
+        _write_film(flights, film)
+    if options.out is not None or not films:
+        _write_page(flights, options.out or options.folder / _PAGE, look=options.out is None)
     return 0
 
 
