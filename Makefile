@@ -12,7 +12,7 @@ SUPPORTED := import sys; (3, 11) <= sys.version_info < (3, 14) or sys.exit(1); p
 PYTHON ?= $(shell for name in $(PYTHONS); do $$name -c '$(SUPPORTED)' 2>/dev/null && break; done)
 UV ?= $(shell uv --version >/dev/null 2>&1 && echo uv)
 
-.PHONY: run test check docs bench golden conf lock clean
+.PHONY: run test check docs pages bench golden conf lock clean
 .DELETE_ON_ERROR:
 
 run: $(STAMP)
@@ -28,6 +28,10 @@ check: $(STAMP)
 
 docs: $(STAMP)
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet --strict
+
+# Tables and numbers of README and site, from the committed results
+pages: $(STAMP)
+	@$(BIN)/python docs/pages.py
 
 bench: $(STAMP)
 	@$(BIN)/python -m benchmarks

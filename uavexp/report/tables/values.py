@@ -17,7 +17,7 @@ def table(results: Results, *, name: str, metrics: Sequence[Metric]) -> Table:
         for arm in panel.arms if panel.has(metric) else ():
             found = estimate(panel, metric, arm)
             numbers = (found.mean, found.sd, *found.interval)
-            rows.append((metric.column, arm, str(found.n), *(f"{value:.6g}" for value in numbers)))
+            rows.append((metric.column, arm, str(found.n), *(f"{value:.10g}" for value in numbers)))
     return Table(
         name=name,
         title="Every mean, one number to a cell",
