@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from uavexp.arrays import Bool, Float, Float32, Int, UInt8
+from uavexp.geometry import polyline_length_m
 from uavexp.types import Outcome, PlanStatus
 
 
@@ -175,3 +176,23 @@ class TrialLog:
     limits: PlanLimits = PlanLimits()
     inspection: Inspection = Inspection()
     wall_s: dict[str, Float] = field(default_factory=dict)  # clock times of each call: never recorded
+
+    @property
+    def summary(self) -> str:
+        """How the flight ended, in one line."""
+        rows = self.steps.time_s.size
+        if not rows:
+            return f"{self.outcome} before the first step"
+        plans = sum(replan.status is PlanStatus.OK for replan in self.replans)
+        return (
+            f"{self.outcome}: {polyline_length_m(self.steps.position_m):.1f} m in "
+            f"{(rows - 1) * self.step_s:.1f} s, {_count(plans, 'plan')}, "
+            f"{_count(len(self.contacts), 'contact')}, least clearance {self.steps.clearance_m.min():.2f} m"
+        )
+
+    def __repr__(self) -> str:
+        return f"TrialLog({self.summary})"
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" if number == 1 else f"{number} {what}s"

@@ -318,3 +318,13 @@ class World:
     reference: ReferenceMap | None = None  # the map known before the flight, where there is one
     space: Space = field(default_factory=Space.all_free)  # what is solid, free, or never measured
     notes: tuple[str, ...] = ()  # what a person should know of it, a sentence each
+
+    def __repr__(self) -> str:
+        size, start, target = (
+            np.round(item, 2).tolist()
+            for item in (np.ptp(self.bounds_m, axis=0), self.start_m, self.target_m)
+        )
+        return (
+            f"World({self.name}, {size} m, {len(self.triangles)} triangles, {start} to {target}, "
+            f"shortest path {self.difficulty.shortest_path_m:.1f} m)"
+        )

@@ -131,12 +131,43 @@ def build_component(group: str, tree: Mapping[str, Any], path: str = "") -> Any:
         raise _told(path, cls, error) from error
     except (TypeError, ValueError, ArithmeticError) as error:
         raise ConfigError(f"{path}: {cls.__name__} cannot be made: {error}") from error
+    _check_protocol(group, component, path)
+    return component
+
+
+def with_own(parts: Parts, own: Mapping[str, Any]) -> Parts:
+    """The parts with components that somebody made (group -> component) in place of the configured ones.
+
+    Raises:
+        ConfigError: one does not speak its group's protocol, or does not fly with the others.
+    """
+    for group, component in own.items():
+        if isinstance(component, type):
+            raise ConfigError(
+                f"{group}: {component.__name__} is a class; give an object, {component.__name__}()"
+            )
+        _check_protocol(group, component, group)
+    parts = dataclasses.replace(parts, **own)
+    if own:
+        _check_needs(parts)
+    return parts
+
+
+def tree_of(component: object) -> dict[str, Any]:
+    """Class and parameters of a component that somebody made, as a configuration would name them."""
+    cls = type(component)
+    known = parameter_types(cls) if dataclasses.is_dataclass(cls) else {}
+    values = {name: getattr(component, name) for name in known}
+    return {TARGET: f"{cls.__module__}.{cls.__qualname__}", **plain(values)}
+
+
+def _check_protocol(group: str, component: object, path: str) -> None:
     lacking = [name for name in protocol_members(group) if not _has(component, name)]
     if lacking:
+        cls = type(component)
         raise ConfigError(
             f"{path}: {cls.__module__}.{cls.__name__} is no {group}, it lacks {', '.join(lacking)}"
         )
-    return component
 
 
 @functools.cache

@@ -23,6 +23,15 @@ class PairedTest:
     found: Difference
     p: float  # of `found`, Holm-corrected over the tests of the same metric
 
+    def __str__(self) -> str:
+        found, both = self.found, ", where both succeeded" if self.both_succeeded else ""
+        low, high = found.interval
+        return (
+            f"{self.metric.label}: {self.first} {found.first_mean:.3g}, "
+            f"{self.second} {found.second_mean:.3g}, difference {found.mean:.3g} "
+            f"(95 %: {low:.3g} to {high:.3g}), p = {self.p:.3g}, {found.pairs} pairs{both}"
+        )
+
 
 def paired_tests(
     panel: Panel, metrics: Sequence[Metric], comparisons: Sequence[tuple[str, str]]
@@ -43,6 +52,15 @@ def paired_tests(
             for metric in asked:
                 tests[metric.column, both].append(_test(pairs, metric, both))
     return tuple(test for family in tests.values() for test in _corrected(family))
+
+
+def paired_test(
+    panel: Panel, metric: Metric, first: str, second: str, *, both_succeeded: bool = False
+) -> PairedTest:
+    """Compare one pair of arms in one metric: nothing to correct for."""
+    return _test(
+        pairs_of(panel, first, second, [metric], both_succeeded=both_succeeded), metric, both_succeeded
+    )
 
 
 def ways(metric: Metric) -> tuple[bool, ...]:

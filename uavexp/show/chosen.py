@@ -33,7 +33,7 @@ def chosen(folder: Path) -> Chosen:
         trial = read_trial(logs[0].parent)
         return Chosen(title=trial.label, trials=(trial,))
     if not logs:
-        raise RecordError(f"{folder}: no trial there has a log; a command keeps them with keep=logs")
+        raise RecordError(f"{folder}: no trial there has a log: its folder {TRIALS}/ was not kept")
     return _arms(folder)
 
 

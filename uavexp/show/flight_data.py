@@ -16,7 +16,6 @@ from uavexp.export.map_voxels import spacing_m
 from uavexp.export.moments import PlanChange, plan_changes
 from uavexp.geometry import yaw_of
 from uavexp.log import TrialLog
-from uavexp.metrics import path
 from uavexp.store.stored_trial import StoredTrial
 
 MOST_ROWS = 1500  # of a path
@@ -50,7 +49,7 @@ def flight_data(log: TrialLog) -> Json:
     steps, rows = log.steps, thinned(log.steps.time_s.size, MOST_ROWS)
     radius_m = log.limits.body_radius_m
     return {
-        "headline": headline(log),
+        "headline": log.summary,
         "time_s": _numbers(steps.time_s[rows]),
         "path": _numbers(steps.position_m[rows].ravel()),
         "yaw": [round(yaw_of(q), 2) for q in steps.quaternion_wxyz[rows]],
@@ -61,20 +60,6 @@ def flight_data(log: TrialLog) -> Json:
         "map": map_data(log),
         "movers": movers_data(log),
     }
-
-
-def headline(log: TrialLog) -> str:
-    """How a flight ended, in one line."""
-    plans, contacts = sum(len(replan.trajectory_m) > 0 for replan in log.replans), len(log.contacts)
-    return (
-        f"{log.outcome}: {path.path_length_m(log):.1f} m in {path.completion_time_s(log):.1f} s, "
-        f"{_count(plans, 'plan')}, {_count(contacts, 'contact')}, "
-        f"least clearance {log.steps.clearance_m.min():.2f} m"
-    )
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}" if number == 1 else f"{number} {what}s"
 
 
 def map_data(log: TrialLog) -> Json:
