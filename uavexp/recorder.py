@@ -117,7 +117,8 @@ class Recorder:
     def flown(self, first: int, end: int) -> Flown:
         """What a mission is shown of the steps from the first to before the second."""
         rows = self.rows[first:end]
-        return Flown(times_s(first, end, self._step_s), rows[:, _POSITION], rows[:, _QUATERNION])
+        time_s = times_s(first, end, self._step_s)
+        return Flown(time_s, rows[:, _POSITION], rows[:, _QUATERNION], rows[:, _ESTIMATED])
 
     def tick(self, observation: Observation, score: float) -> None:
         """Add the row of one ESDF update, and the goal if it is a new one.

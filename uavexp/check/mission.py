@@ -57,7 +57,7 @@ def _without_a_goal(world: World) -> Observation:
 def _flown(position_m: Float) -> Flown:
     """At places (N, 3), one after the other, until 95 s have passed."""
     upright = np.tile([1.0, 0.0, 0.0, 0.0], (len(position_m), 1))
-    return Flown(np.linspace(0.0, 95.0, len(position_m)), position_m, upright)
+    return Flown(np.linspace(0.0, 95.0, len(position_m)), position_m, upright, position_m)
 
 
 def _on_the_way(world: World) -> Flown:

@@ -244,7 +244,9 @@ class Dense(MapParameters):
 
     def update(self, time_s: float) -> MapUpdate:
         """Bring the ESDF up to date; return what changed since the last call."""
-        return self._live().publish(time_s)
+        grid = self._live()
+        grid.fade(time_s)
+        return grid.publish(time_s)
 
     @property
     def field(self) -> DistanceField:

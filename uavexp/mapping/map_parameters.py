@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -45,6 +46,9 @@ class MapParameters(FieldParameters):
     max_evidence: Annotated[int, between(1, LARGEST_EVIDENCE)] = 12  # counts at most (<= 31);
     # what was removed is forgotten after 12 misses, 0.6 s [ours]
 
+    forget_s: Positive | None = None  # s after which what is no longer seen is unknown again, against
+    # drift (a voxel seen for fewer than max_weight frames sooner); null: never [ours]
+
     def __post_init__(self) -> None:
         FieldParameters.__post_init__(self)
         require(
@@ -79,4 +83,5 @@ class MapParameters(FieldParameters):
 
     def empty_map(self, bounds_m: Float) -> OccupancyMap:
         """Return a map of `bounds_m` (2, 3) in which everything is unknown."""
-        return OccupancyMap(bounds_m, self.voxel_size_m, self.max_distance_m, self.max_memory_mb)
+        fade_s = math.inf if self.forget_s is None else self.forget_s / self.max_weight
+        return OccupancyMap(bounds_m, self.voxel_size_m, self.max_distance_m, self.max_memory_mb, fade_s)

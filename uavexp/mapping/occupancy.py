@@ -25,6 +25,9 @@ D <- (w D + d) / (w + 1) with capped w (Curless and Levoy 1996), and judged:
 - Deeper than `solid_depth_m` behind a surface nothing is judged, and beyond the truncation
   nothing is touched: it stays unknown. The margin between the two keeps noise from deepening
   walls layer by layer, as voxels just beyond the truncation are touched now and then.
+- Where evidence fades (`forget_s`, for a vehicle whose position drifts), the weight of every voxel
+  sinks by one each `forget_s / max_weight`, and what has none left is unknown again: the longer a
+  voxel was in view, the longer it is remembered. What was declared free does not fade.
 """
 
 from __future__ import annotations
@@ -138,6 +141,18 @@ def _mark_ball(voxels: Voxels, centre: Float, radius: float, count: int) -> int:
 
 
 @nb.njit(cache=True)
+def _fade(voxels: Voxels, faded: Int32, by: int, count: int) -> int:
+    """Take `by` off the weight of voxels (N,), and what is known of those that have none left."""
+    for n in range(faded.shape[0]):
+        at = faded[n]
+        left = max(np.int64(voxels.weight[at]) - by, 0)
+        voxels.weight[at] = left
+        if left == 0:
+            count = enlist(voxels, at, np.int64(voxels.live[at]) & _LISTED | UNKNOWN, count)
+    return count
+
+
+@nb.njit(cache=True)
 def _publish(voxels: Voxels, count: int, flipped: Int32, first_seen: Int32) -> tuple[int, int]:
     """Carry listed changes from `live` to `state`; list voxels that flipped and that were first seen."""
     live, state, flips, firsts = voxels.live, voxels.state, 0, 0
@@ -196,9 +211,14 @@ class OccupancyMap:
     """
 
     def __init__(
-        self, bounds_m: Float, voxel_size_m: float, max_distance_m: float, max_memory_mb: float
+        self,
+        bounds_m: Float,
+        voxel_size_m: float,
+        max_distance_m: float,
+        max_memory_mb: float,
+        fade_s: float = math.inf,
     ) -> None:
-        """Begin with everything unknown; see `grid_shape` for what is refused."""
+        """Begin with everything unknown; weights sink by one each `fade_s`. Refuses as `grid_shape`."""
         self.shape = grid_shape(bounds_m, voxel_size_m, max_memory_mb)
         size = self.shape[0] * self.shape[1] * self.shape[2]
         self.origin_m: Float = np.array(bounds_m[0], dtype=np.float64)
@@ -212,6 +232,7 @@ class OccupancyMap:
             changes=np.empty(size, np.int32),
         )
         self.changed = 0  # how many of the voxels' `changes` are in use
+        self._fade_s, self._fades = fade_s, 0  # and how often they have
         self._flipped: Int32 = np.empty(size, np.int32)
         self._first_seen: Int32 = np.empty(size, np.int32)
         self._rays: tuple[Float32, Int32] | None = None
@@ -237,6 +258,17 @@ class OccupancyMap:
             size = self.voxels.tsdf_m.size
             self._rays = np.full(size, np.inf, np.float32), np.empty(size, np.int32)
         return self._rays
+
+    def fade(self, time_s: float) -> Int32:
+        """Let evidence fade up to now; returns the voxels (N,) whose weight sank, flat and ascending."""
+        by = int(time_s / self._fade_s) - self._fades
+        if by <= 0:
+            return np.empty(0, np.int32)
+        self._fades += by
+        faded = np.flatnonzero(self.voxels.weight).astype(np.int32)
+        self.changed = _fade(self.voxels, faded, by, self.changed)
+        count_changes(faded[self.voxels.weight[faded] == 0], self.shape, self._tiles)
+        return faded
 
     def publish(self, time_s: float) -> MapUpdate:
         """Bring state and field up to what was integrated; return what changed since last time."""

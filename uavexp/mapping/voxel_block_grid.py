@@ -245,7 +245,9 @@ class VoxelBlockGrid(MapParameters):
 
     def update(self, time_s: float) -> MapUpdate:
         """Bring the ESDF up to date; return what changed since the last call."""
-        return self._live().publish(time_s)
+        grid = self._live()
+        self._hand_over(grid.fade(time_s))
+        return grid.publish(time_s)
 
     @property
     def field(self) -> DistanceField:
@@ -267,7 +269,7 @@ class VoxelBlockGrid(MapParameters):
                 )
 
     def _hand_over(self, touched: Int32) -> None:
-        """Write voxels (N,) that were fused outside of Open3D into its blocks."""
+        """Write voxels (N,) that were changed outside of Open3D into its blocks."""
         grid = self._live()
         blocks, local = blocks_of(touched, grid.shape)
         if blocks.shape[0] == 0:

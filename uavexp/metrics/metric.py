@@ -15,7 +15,7 @@ SUCCESS = "success"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Flight:
-    """What metrics are measured on: a log, which may be empty, the true world, and three limits."""
+    """What metrics are measured on: a log, which may be empty, the true world, and four limits."""
 
     log: TrialLog
     world: World
@@ -23,6 +23,7 @@ class Flight:
     # Chen et al. 2026 is 0.31 m)
     safety_threshold_m: float = 0.30
     useful_change_m: float = 0.10  # m, departure from the old plan from which a replan was useful [ours]
+    arrival_m: float = 0.30  # m, the vehicle believes to be there within this distance (`Goto.tolerance_m`)
     near_miss_m: float = 0.50  # m, of a mover from the body's centre ([ours]: the buffer delta of paper 2)
 
 

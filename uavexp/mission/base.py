@@ -14,11 +14,12 @@ from uavexp.types import Limits, Observation, Outcome, World
 
 
 class Flown(NamedTuple):
-    """Steps of a flight, in truth."""
+    """Steps of a flight, in truth, and where the vehicle believed to be."""
 
     time_s: Float  # (N,)
     position_m: Float  # (N, 3)
     quaternion_wxyz: Float  # (N, 4)
+    estimated_position_m: Float  # (N, 3)
 
 
 class Mission(Protocol):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import field
+from typing import Literal
 
 import numpy as np
 
@@ -17,9 +18,11 @@ from uavexp.types import Limits, Observation, Outcome, World
 
 @option
 class Goto:
-    """Reached = within `tolerance_m` of the target, in truth."""
+    """Reached = within `tolerance_m` of the target, in truth or as the vehicle believes."""
 
-    tolerance_m: Positive = 0.3  # m, the target counts as reached within this distance, in truth [ours]
+    tolerance_m: Positive = 0.3  # m, the target counts as reached within this distance [ours]
+    arrival: Literal["truth", "belief"] = "truth"  # of the vehicle's true or estimated position: a
+    # vehicle that drifts knows only the latter
     time_base_s: Positive = 60.0  # s, time limit = this ... [ours]
     time_per_path_spm: NonNegative = 5.0  # s/m, ... plus this for each metre of the true shortest path [ours]
     _world: World | None = field(init=False, repr=False, default=None)
@@ -51,8 +54,9 @@ class Goto:
         return self.time_base_s + self.time_per_path_spm * self._task().difficulty.shortest_path_m
 
     def outcome(self, flown: Flown, observation: Observation) -> tuple[int, Outcome] | None:
-        """REACHED within the tolerance of the target."""
-        gap_m = flown.position_m - self._task().target_m
+        """REACHED at the first step within the tolerance of the target."""
+        position_m = flown.position_m if self.arrival == "truth" else flown.estimated_position_m
+        gap_m = position_m - self._task().target_m
         there = np.flatnonzero(np.sqrt((gap_m * gap_m).sum(axis=1)) <= self.tolerance_m)
         return (int(there[0]), Outcome.REACHED) if len(there) else None
 

@@ -286,3 +286,44 @@ def test_what_is_not_seen_of_a_large_hall_takes_no_memory():
 
 def resident_mib() -> float:
     return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize() / 2**20
+
+
+def test_what_is_no_longer_seen_is_forgotten_and_seen_anew(option):
+    backend = begin(option, forget_s=10.0)
+    for n in range(1, 41):  # to 2 s at 20 Hz: all weight there is, less the one that fades at 2 s
+        backend.integrate(take_scan([WALL], CAMERA_M))
+        backend.update(0.05 * n)
+    known = backend.field.state.copy()
+    backend.update(11.4)
+    assert (backend.field.state == known).all()
+    tiles = backend.field.changed.copy()
+    update = backend.update(11.5)
+    assert (backend.field.state == UNKNOWN).all()
+    assert (backend.field.distance == backend.max_distance_m).all()
+    assert not update.occupied.any()
+    assert (backend.field.changed != tiles).any()
+    for _ in range(2):
+        backend.integrate(take_scan([WALL], CAMERA_M))
+    again = backend.update(11.6)
+    assert (backend.field.state == known).mean() > 0.999
+    assert again.first_seen.sum() == (backend.field.state != UNKNOWN).sum()
+
+
+def test_the_less_it_was_seen_the_sooner_it_is_forgotten_but_not_what_is_in_view(option):
+    backend = begin(option, forget_s=10.0)
+    backend.mark_free((7.0, 1.0, 1.0), 0.3)
+    for _ in range(4):
+        backend.integrate(take_scan([WALL], CAMERA_M))
+    backend.update(1.9)  # fades at 0.5, 1.0 and 1.5 s: a frame of four is left
+    assert occupied(backend).any()
+    backend.integrate(take_scan([], (7.0, 3.0, 1.5)))  # elsewhere
+    backend.update(2.0)
+    assert not occupied(backend).any()
+    assert (backend.field.state == FREE).any()
+    lasting = begin(option, forget_s=10.0)
+    for n in range(1, 801):
+        if n % 2 == 0:
+            lasting.integrate(take_scan([WALL], CAMERA_M))
+        update = lasting.update(0.1 * n)
+    assert occupied(lasting).any()
+    assert not update.voxel.size

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -133,6 +134,23 @@ class TestClearance:
 
 
 class TestSuccess:
+    def test_arrival_is_told_in_truth_and_as_believed(self):
+        world = make_world([], target_m=(6.0, 8.0, 0.0))  # the line's end after 10 s
+        beside_m = np.array([0.0, 0.4, 0.3])
+        log = make_log(line, line_velocity)
+        drifted = changed(log, position_m=log.steps.position_m + beside_m)
+        astray = changed(log, estimated_position_m=log.steps.position_m + beside_m)
+        for flight, gap_m, believed in ((log, 0.0, 1.0), (drifted, 0.5, 1.0), (astray, 0.0, 0.0)):
+            values = evaluate(flight, world)
+            assert values["target_gap_m"] == pytest.approx(gap_m, abs=1e-12)
+            assert values["believed_arrival"] == believed
+        for touch_s, believed in ((9.6, 0.0), (9.8, 1.0)):  # at 1 m/s it is 0.3 m away after 9.7 s
+            touch = Contact(start_s=touch_s, end_s=touch_s, position_m=np.zeros(3))
+            assert evaluate(changed(log, contacts=(touch,)), world)["believed_arrival"] == believed
+        exploring = evaluate(changed(log, seen_share=0.5), world)
+        assert math.isnan(exploring["believed_arrival"])
+        assert math.isnan(exploring["target_gap_m"])
+
     @pytest.mark.parametrize("outcome", list(Outcome))
     def test_success_is_arrival_without_contact(self, outcome):
         touch = (Contact(start_s=1.0, end_s=1.1, position_m=np.zeros(3)),)
@@ -260,8 +278,9 @@ def test_metrics_do_not_depend_on_where_the_world_stands():
     turn = np.array(
         [[math.cos(angle), -math.sin(angle), 0], [math.sin(angle), math.cos(angle), 0], [0, 0, 1]]
     )
-    log = flight()
-    assert_same(evaluate(log, WORLD), evaluate(moved(log, turn @ tilt, np.array([5.0, -3.0, 2.0])), WORLD))
+    log, turned, shift_m = flight(), turn @ tilt, np.array([5.0, -3.0, 2.0])
+    elsewhere = replace(WORLD, target_m=turned @ WORLD.target_m + shift_m)
+    assert_same(evaluate(log, WORLD), evaluate(moved(log, turned, shift_m), elsewhere))
 
 
 def test_metrics_do_not_depend_on_when_the_flight_began():

@@ -61,9 +61,8 @@ def state(position_m: np.ndarray, yaw_rad: float = 0.0) -> State:
 def flown(*times_s: float) -> Flown:
     """On the spot, at the start."""
     count = len(times_s)
-    return Flown(
-        np.array(times_s), np.tile(START_M, (count, 1)), np.tile(quaternion_from_yaw(0.0), (count, 1))
-    )
+    place_m = np.tile(START_M, (count, 1))
+    return Flown(np.array(times_s), place_m, np.tile(quaternion_from_yaw(0.0), (count, 1)), place_m)
 
 
 def seen_at(time_s: float, here: State, field: DistanceField = HALL.field) -> Observation:

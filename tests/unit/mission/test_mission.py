@@ -33,7 +33,7 @@ def at(time_s: float, *, goal: bool = True) -> Observation:
 
 def flown(times_s: Sequence[float], position_m: Sequence[np.ndarray] | np.ndarray) -> Flown:
     upright = np.tile([1.0, 0.0, 0.0, 0.0], (len(times_s), 1))
-    return Flown(np.array(times_s), np.array(position_m), upright)
+    return Flown(np.array(times_s), np.array(position_m), upright, np.array(position_m))
 
 
 def test_reached_is_within_the_tolerance_in_truth(hall: World) -> None:
@@ -44,6 +44,15 @@ def test_reached_is_within_the_tolerance_in_truth(hall: World) -> None:
     assert mission.outcome(flown([1.0, 1.01, 1.02, 1.03], places_m), at(1.0)) == (2, Outcome.REACHED)
     assert mission.outcome(flown([1.0, 1.01], places_m[:2]), at(1.0)) is None
     assert mission.time_limit_s == pytest.approx(60.0 + 5.0 * hall.difficulty.shortest_path_m)
+
+
+@pytest.mark.parametrize(("arrival", "step"), [("truth", 2), ("belief", 0)])
+def test_reached_is_judged_in_the_frame_that_is_asked_for(hall: World, arrival: str, step: int) -> None:
+    mission = Goto(arrival=arrival)
+    mission.reset(hall, Scene(hall), LIMITS)
+    way = flown([1.0, 1.01, 1.02], hall.target_m + np.array([[0.5], [0.4], [0.0]]))
+    way = way._replace(estimated_position_m=way.position_m - [0.4, 0.4, 0.4])
+    assert mission.outcome(way, at(1.0)) == (step, Outcome.REACHED)
 
 
 def test_explored_is_no_goal_for_the_patience(hall: World) -> None:
