@@ -145,7 +145,7 @@ def _fade(voxels: Voxels, faded: Int32, by: int, count: int) -> int:
     """Take `by` off the weight of voxels (N,), and what is known of those that have none left."""
     for n in range(faded.shape[0]):
         at = faded[n]
-        left = max(np.int64(voxels.weight[at]) - by, 0)
+        left: int = max(int(voxels.weight[at]) - by, 0)
         voxels.weight[at] = left
         if left == 0:
             count = enlist(voxels, at, np.int64(voxels.live[at]) & _LISTED | UNKNOWN, count)
