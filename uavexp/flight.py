@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -83,6 +83,19 @@ def fly(*overrides: str, config_dir: str | Path | None = None, **values: Any) ->
         ConfigError: a wrong key or value, or more than one cell or seed.
         WorldError: the world cannot be made or read.
     """
+    cell, seed, own = one_trial(overrides, config_dir, values)
+    folder = None if config_dir is None else user_folder(str(config_dir))
+    return replace(fly_cell(cell, seed, own=own), folder=folder)
+
+
+def one_trial(
+    overrides: Sequence[str], config_dir: str | Path | None, values: Mapping[str, Any]
+) -> tuple[Cell, int, dict[str, object]]:
+    """What `fly` is asked for: a cell, a seed, and components by group that were given as objects.
+
+    Raises:
+        ConfigError: as `fly`.
+    """
     own = {key: value for key, value in values.items() if key in GROUPS and not isinstance(value, _TYPED)}
     typed = [
         *parse_settings(overrides),
@@ -97,7 +110,7 @@ def fly(*overrides: str, config_dir: str | Path | None = None, **values: Any) ->
         )
     if command.out is not None:
         raise ConfigError("uavexp.fly writes nothing: out has no place here")
-    return replace(fly_cell(command.cells[0], command.seeds[0], own=own), folder=folder)
+    return command.cells[0], command.seeds[0], own
 
 
 def fly_cell(

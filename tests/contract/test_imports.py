@@ -21,7 +21,7 @@ LAYERS = (
     {"roles", "metrics", "inspection"},
     {"recorder", "map_grid", "seen_share", "passage", "pilot", "motion", "trial"},
     {"config"},
-    {"flight", "__init__"},
+    {"flight", "__init__", "policy", "env"},
     {"store", "check"},
     {"export"},
     {"report"},
