@@ -10,6 +10,7 @@ from uavexp.errors import RecordError
 from uavexp.paths import experiments_folder
 
 _FILE = "reference.csv"
+_CITATION = "paper.txt"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,6 +47,13 @@ def read_reference(experiment: str) -> Reference:
         }
     except (KeyError, ValueError) as error:
         raise RecordError(f"{_FILE} of {experiment}: damaged ({error})") from error
+
+
+def citation(experiment: str) -> str:
+    """The paper that an experiment belongs to, as it is cited; empty where none is named."""
+    paper = experiment.rpartition("/")[0]
+    file = experiments_folder() / paper / _CITATION
+    return file.read_text(encoding="utf-8").strip() if paper and file.is_file() else ""
 
 
 def read_rows(experiment: str, file_name: str) -> list[dict[str, str]]:

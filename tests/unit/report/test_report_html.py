@@ -16,8 +16,10 @@ import pytest
 from tests.studies import copy_of, made_up
 from uavexp.metrics import replanning
 from uavexp.report import flight3d, html
+from uavexp.report.abbreviations import ABBREVIATIONS
 from uavexp.report.contents import Judgement, Report
 from uavexp.report.figures.base import png_of
+from uavexp.report.html_failed import MOST_FAILED
 from uavexp.report.judges import Verdict
 from uavexp.report.tables.base import Table
 from uavexp.store.study import TRIALS, read_wall
@@ -91,11 +93,13 @@ class TestOneFile:
     def test_nothing_is_fetched(self, page):
         for tag, attributes in page.tags:
             address = attributes.get("src") or attributes.get("href") or ""
+            if tag == "a" and address.startswith("https://doi.org/"):
+                continue  # followed by a click alone
             assert address.startswith(("data:", "#", f"{TRIALS}/", "figures/")) or not address, (tag, address)
-            assert tag not in ("link", "iframe", "object")
+            assert tag not in ("iframe", "object")
 
     def test_every_figure_is_in_it_with_its_caption(self, page, drawn):
-        images = [image["src"] for image in page.all("img")]
+        images = [image["src"] for image in page.all("img") if image["src"].startswith("data:")]
         assert len(images) == len(drawn) > 0
         for source, (drawing, path) in zip(images, drawn, strict=True):
             assert base64.b64decode(source.removeprefix("data:image/png;base64,")) == path.read_bytes()
@@ -125,6 +129,18 @@ class TestOneFile:
         assert "1 reproduced, 1 not reproduced, 1 not testable" in page.words
         for mark in ("✓ reproduced", "✗ not reproduced", "– not testable"):
             assert mark in page.words
+
+    def test_the_verdict_stands_first_then_what_was_flown(self, page, flown):
+        order = ("Claims of the paper:", "Success in %", "Date", "Machine")
+        told = [page.words.index(word) for word in order]
+        assert told == sorted(told)
+        assert told[-1] < page.words.index("A <table>")
+        assert "10.3390/drones10030168" in page.words
+        assert flown.measurements["code"].iloc[0] in page.words
+
+    def test_abbreviations_of_the_page_are_spelled_out_and_no_others(self, page):
+        assert ABBREVIATIONS["SSP"] in page.words
+        assert ABBREVIATIONS["BARN"] not in page.words
 
     def test_the_command_is_told_without_where_it_wrote_to(self, flown, tmp_path):
         study = copy_of(flown, tmp_path / "run")
@@ -166,6 +182,17 @@ class TestFailedTrials:
         for command in failed["wall_command"]:
             assert command in page.words
 
+    def test_ways_of_ending_are_counted(self, tmp_path):
+        rows = pd.DataFrame({"seed": range(4), "cell": "MCR", "status": ["ok", "ok", "ok", "killed"]})
+        rows["success"] = [True, False, False, False]
+        rows["outcome"] = ["reached", "reached", "stuck", "error"]
+        rows["trial"] = [f"t{number}" for number in range(4)]
+        rows["strategy"] = rows["world"] = "x"
+        words = Page(written(made_up(tmp_path, rows, {"cell": ("MCR",)}))).words
+        table = words[words.index("reached after contact") :]
+        assert table.index("killed") > 0
+        assert "3 of 4" in table
+
     def test_trials_that_succeeded_are_not_listed(self, flown, page):
         won = set(flown.trials[flown.trials["success"]]["trial"])
         assert not won & {href.split("/")[1] for href in self.rows(page)}
@@ -179,7 +206,7 @@ class TestFailedTrials:
         assert "1 of 1 trials" in page.words
 
     def test_a_long_list_is_capped_and_says_where_the_rest_is(self, tmp_path):
-        n = html.MOST_FAILED + 7
+        n = MOST_FAILED + 7
         rows = pd.DataFrame(
             {"seed": range(n), "success": False, "cell": "MCR", "status": "ok", "outcome": "stuck"}
         )

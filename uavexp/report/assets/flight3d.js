@@ -94,11 +94,11 @@
       { type: "mesh3d", ...mesh, intensity: mesh.z, colorscale: HEIGHTS, cmin: data.height_m[0],
         cmax: data.height_m[1], flatshading: true, opacity: 1, hoverinfo: "skip", name: "map",
         lighting: { ambient: 0.9, diffuse: 0.5, specular: 0.05 },
-        colorbar: { title: { text: "height [m]" }, len: 0.5, thickness: 12 } },
+        showscale: !isNarrow, colorbar: { title: { text: "height [m]" }, len: 0.5, thickness: 12 } },
       { ...along(data.shortest), mode: "lines", name: "true shortest path", hoverinfo: "skip",
         line: { color: "#888888", width: 3, dash: "dot" } },
       { ...along(flight.reference), mode: "lines", name: "reference", hoverinfo: "skip",
-        line: { color: "#000000", width: 3, dash: "dash" } },
+        line: { color: ink, width: 3, dash: "dash" } },
       { ...along(flight.flown), mode: "lines", name: "flown", hoverinfo: "text", text: flight.hover,
         line: { color: flight.colour, width: 7 } },
       ...moverTraces(flight.movers),
@@ -112,15 +112,37 @@
     ];
   }
 
+  // all flights and both ends in view: the longest side of what is shown is 1, seen from slantwise above
+  function sceneOf() {
+    const points = [0, 1, 2].map((axis) => [
+      data.start[axis], data.target[axis],
+      ...data.flights.flatMap((flight) => flight.flown[axis]), ...(axis === 2 ? data.height_m : []),
+    ]);
+    const ranges = points.map((values, axis) => {
+      const [low, high] = values.reduce(([a, b], value) => [Math.min(a, value), Math.max(b, value)], [Infinity, -Infinity]);
+      return axis === 2 ? [low, high] : [low - 1, high + 1];
+    });
+    const sizes = ranges.map(([low, high]) => high - low);
+    const longest = Math.max(...sizes);
+    const [x, y, z] = sizes.map((size) => size / longest);
+    const narrow = Math.max(1, place.clientHeight / place.clientWidth); // an upright window sees less to the sides
+    const away = 0.85 * narrow * Math.hypot(x, y, z);
+    const axis = (name, range) => ({ title: { text: `${name} [m]` }, range, color: ink, gridcolor: line });
+    return {
+      aspectmode: "manual", aspectratio: { x, y, z },
+      camera: { eye: { x: -0.1 * away, y: -0.75 * away, z: 0.95 * away }, center: { x: 0, y: 0, z: -0.15 } },
+      xaxis: axis("x", ranges[0]), yaxis: axis("y", ranges[1]), zaxis: axis("z", ranges[2]),
+    };
+  }
+
+  const styles = getComputedStyle(document.documentElement);
+  const [ink, line, paper] = ["--ink", "--line", "--paper"].map((name) => styles.getPropertyValue(name).trim());
+  const isNarrow = place.clientWidth < 600;
   const layout = {
     margin: { l: 0, r: 0, t: 0, b: 0 }, uirevision: "kept", // the camera stays when the flight changes
-    legend: { x: 0, y: 1, bgcolor: "rgba(255,255,255,0.8)" },
-    scene: {
-      aspectmode: "data",
-      camera: { eye: { x: -0.3, y: -1.3, z: 1.7 } },
-      xaxis: { title: { text: "x [m]" } }, yaxis: { title: { text: "y [m]" } },
-      zaxis: { title: { text: "z [m]" } },
-    },
+    paper_bgcolor: paper, font: { color: ink, size: isNarrow ? 9 : 12 },
+    legend: { x: 0, y: 1, bgcolor: "rgba(0,0,0,0)" },
+    scene: sceneOf(),
   };
 
   function draw() {

@@ -50,7 +50,7 @@ def _draw(name: str, arm: str, shared: SharedWorld) -> Drawing:
     log = shared.logs[arm]
     shown = replanning.executed(log)[: _COLUMNS * _ROWS]
     rows = -(-len(shown) // _COLUMNS)
-    drawn = base.new_figure(base.PAGE_IN, 2.0 + 2.55 * rows)
+    drawn = base.new_figure(base.PAGE_IN, 2.0 + 2.65 * rows)
     names = [[f"{row} {column}" for column in range(_COLUMNS)] for row in range(rows)]
     parts: dict[str, Axes] = drawn.subplot_mosaic(
         [*names, ["score"] * _COLUMNS], height_ratios=[2.5] * rows + [1.0]
@@ -61,6 +61,8 @@ def _draw(name: str, arm: str, shared: SharedWorld) -> Drawing:
     for number, (axes, replan) in enumerate(zip(parts.values(), shown, strict=False)):
         axes.set_axis_on()
         _draw_close_up(axes, shared.world, log, replan, _letter(number))
+        axes.set_xlabel("x [m]")
+        axes.set_ylabel("y [m]" if number % _COLUMNS == 0 else "")
     _draw_score(score, log, shown)
     drawn.legend(handles=_key(), loc="outside upper center", ncols=7, fontsize=7, columnspacing=1.0)
     return Drawing(name=name, caption=_caption(arm, shared, len(shown)), figure=drawn)
@@ -79,7 +81,6 @@ def _draw_close_up(axes: Axes, world: World, log: TrialLog, replan: Replan, lett
     axes.plot(*replan.position_m[:2], zorder=7, **replan_marks.marker(replan.cause, 8.0))
     centre_m = _centre_m(replan)
     plan_view.frame(axes, np.stack([centre_m - _REACH_M, centre_m + _REACH_M]))
-    axes.set(xlabel="", ylabel="")
     what = f", {base.count(len(changed_m), 'voxel')}" if len(changed_m) else ""
     title = f"{letter}: {replan.cause}{what}, {replan.time_s:.1f} s\n{_departure(replan)}"
     axes.set_title(title, fontsize=7.5, loc="left")

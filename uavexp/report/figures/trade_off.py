@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
-from matplotlib.patheffects import withStroke
 
 from uavexp.metrics.metric import Metric
-from uavexp.report.comparison import Panel, estimate
+from uavexp.report.comparison import ArmEstimate, Panel, estimate
 from uavexp.report.figures import base
 from uavexp.report.figures.base import Drawing
+from uavexp.report.figures.label_places import Labelled, write_labels
 from uavexp.report.labels import CLEARANCE, RATE, REPLANS
 from uavexp.report.looks import Look, looks_of
 from uavexp.report.results import ARM, Results
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 
 METRICS = (RATE, CLEARANCE, REPLANS)
 SETTING = "setting"  # axis that tells the cells of one entry apart ("interval_s=2"); made by the command line
-_FULL_PERCENT = 99.9
 _LINEAR_BELOW = 1.0  # replans; a logarithmic axis with room for none at all
 
 
@@ -88,9 +88,8 @@ def _plane(panel: Panel, curves: Sequence[Curve], looks: Mapping[str, Look]) -> 
     figure = base.new_figure(base.PAGE_IN, 3.5)
     sides = figure.subplots(1, 2)
     for axes, metric in zip(sides, (RATE, CLEARANCE), strict=True):
-        for number, curve in enumerate(curves):
+        for curve in curves:
             _draw_curve(axes, panel, metric, curve, looks[curve.name])
-            _draw_labels(axes, panel, metric, curve, below=number % 2 == 0)
         _finish(axes, metric, panel)
     sides[0].set_ylim(_lowest_percent(panel), 102.0)
     columns = min(len(curves), 5)
@@ -101,7 +100,27 @@ def _plane(panel: Panel, curves: Sequence[Curve], looks: Mapping[str, Look]) -> 
         fontsize=8,
         handlelength=2.6,
     )
+    figure.draw_without_rendering()  # gives the axes their place, by which labels are laid out
+    for axes, metric in zip(sides, (RATE, CLEARANCE), strict=True):
+        write_labels(axes, [_labelled(panel, metric, curve, looks[curve.name]) for curve in curves])
     return figure
+
+
+def _labelled(panel: Panel, metric: Metric, curve: Curve, look: Look) -> Labelled:
+    found = [(estimate(panel, REPLANS, arm), estimate(panel, metric, arm)) for arm in curve.arms]
+    points = [(across.mean, up.mean) for across, up in found]
+    lines = [line for across, up in found for line in _bars(across, up)]
+    joined = list(pairwise(points)) if curve.parameter else []
+    known = np.array([*lines, *joined]).reshape(-1, 2, 2)
+    return Labelled(np.array(points), curve.labels, look.colour, known[np.isfinite(known).all(axis=(1, 2))])
+
+
+def _bars(across: ArmEstimate, up: ArmEstimate) -> list[tuple[tuple[float, float], tuple[float, float]]]:
+    """Both intervals of a point, as lines."""
+    return [
+        ((across.interval.low, up.mean), (across.interval.high, up.mean)),
+        ((across.mean, up.interval.low), (across.mean, up.interval.high)),
+    ]
 
 
 _CAPTION = (
@@ -121,18 +140,6 @@ def _draw_curve(axes: Axes, panel: Panel, metric: Metric, curve: Curve, look: Lo
     axes.hlines(y, *x_ends, color=look.colour, lw=0.8, alpha=0.55, zorder=2)
     line = {"lw": 1.1, **look.line} if curve.parameter else {"ls": "", "color": look.colour}
     axes.plot(x, y, marker=look.marker, ms=5.5, mec="white", mew=0.5, zorder=3, label=curve.name, **line)
-
-
-def _draw_labels(axes: Axes, panel: Panel, metric: Metric, curve: Curve, *, below: bool) -> None:
-    """Write what varies beside each point, for every other curve below it, so that few lie on each other."""
-    for arm, label in zip(curve.arms, curve.labels, strict=True):
-        place = (estimate(panel, REPLANS, arm).mean, estimate(panel, metric, arm).mean)
-        if metric is RATE and place[1] > _FULL_PERCENT:
-            continue  # points in a row at the top: the other side tells them apart
-        offset_pt = (4, -9 if below else 3)
-        note = axes.annotate(label, place, offset_pt, textcoords="offset points", fontsize=base.SMALL_PT)
-        note.set_path_effects([withStroke(linewidth=1.2, foreground="white")])
-        note.set_in_layout(False)  # a label at the edge must not shrink the plane
 
 
 def _lowest_percent(panel: Panel) -> float:
