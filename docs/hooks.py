@@ -91,15 +91,25 @@ def _parameters(group: str, option: Option) -> list[str]:
 
 
 def _study_page(folder: Path) -> str:
-    """Command, verdicts, tables and figures of a study, as its report made them."""
+    """Command, verdicts, tables and figures of a study, in the order in which its report has them."""
     study: dict[str, Any] = json.loads((folder / "study.json").read_text(encoding="utf-8"))
     lines = [f"# {study['title'] or folder.name}", "", f"`python -m uavexp experiments={study['name']}`", ""]
     if (folder / "report.html").exists():
         lines += ["[The report as one page](report.html)", ""]
-    tables = sorted((folder / "tables").glob("*.md"))
-    for file in [*tables, *([folder / "claims.md"] if (folder / "claims.md").exists() else [])]:
+    claims = [folder / "claims.md"] if (folder / "claims.md").exists() else []
+    for file in [*claims, *_in_order(folder / "tables", "*.md", study["report"].get("tables", []))]:
         lines += [re.sub(r"(?m)^### ", "## ", file.read_text(encoding="utf-8")), ""]
-    for figure in sorted((folder / "figures").glob("*.png")):
+    for figure in _in_order(folder / "figures", "*.png", study["report"].get("figures", [])):
         name = figure.stem.replace("_", " ")
         lines += [f"## {name}", "", f"![{name}](figures/{figure.name})", ""]
     return "\n".join(lines)
+
+
+def _in_order(folder: Path, pattern: str, declared: list[Any]) -> list[Path]:
+    """Files of a folder as the report declares them, the others behind."""
+    names = []
+    for item in declared:
+        kind, options = next(iter(item.items())) if isinstance(item, dict) else (item, {})
+        names.append(options.get("name", kind.rpartition(".")[2]))
+    place = {name: number for number, name in enumerate(names)}
+    return sorted(folder.glob(pattern), key=lambda file: (place.get(file.stem, len(place)), file.stem))

@@ -68,7 +68,7 @@ def test_the_flight_in_3d_begins_with_all_of_it_in_view(
       const scene = document.querySelector('#flight')._fullLayout.scene._scene, { dataScale } = scene;
       const { model, view, projection } = scene.glplot.cameraParams;
       const data = JSON.parse(document.getElementById('flights').textContent);
-      const times = (m, v) => [0, 1, 2, 3].map(r => [0, 1, 2, 3].reduce((s, c) => s + m[4 * c + r] * v[c], 0));
+      const times = (m, v) => [0, 1, 2, 3].map(r => v.reduce((sum, x, c) => sum + m[4 * c + r] * x, 0));
       const points = data.flights.flatMap(f => f.flown[0].map((_, n) => [0, 1, 2].map(a => f.flown[a][n])));
       return points.every(point => {
         const p = times(projection, times(view, times(model, [...point.map((x, a) => x * dataScale[a]), 1])));

@@ -1,4 +1,4 @@
-"""Pages of the site as a person sees them: nothing in red, nothing fetched from elsewhere, nothing cut off."""
+"""Pages of the site as a person sees them: nothing in red, nothing fetched, nothing cut off."""
 
 from __future__ import annotations
 
