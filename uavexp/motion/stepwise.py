@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from uavexp.motion.base import Craft, Ending, Judge
+from uavexp.movers.base import Reacting
 from uavexp.types import Command, Reference, State
 
 
@@ -16,6 +17,10 @@ class Stepwise:
     state: State
     estimate: State
     _command: Command = field(init=False)
+    _looked_at: Reacting | None = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._looked_at = self.craft.movers if isinstance(self.craft.movers, Reacting) else None
 
     def fly(self, first: int, end: int, reference: Reference | None, judge: Judge) -> Ending | None:
         """Fly from one tick to the next (see `Motion`)."""
@@ -37,6 +42,8 @@ class Stepwise:
         """Fly the step that ends at a time."""
         craft = self.craft
         moved = craft.vehicle.step(self._command, craft.step_s)
+        if self._looked_at is not None:
+            self._looked_at.notice(moved.position_m, moved.velocity_mps)
         craft.contact.scene.place(craft.movers.at(time_s))
         self.state, touched = craft.contact.advance(self.state, moved, time_s)
         if touched:

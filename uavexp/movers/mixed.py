@@ -1,7 +1,9 @@
 """Movers of several shapes and sizes that move in several ways, all drawn from the seed.
 
 Spheres fly, people (upright cylinders) and boxes stand on the floor; `motion` says how they
-move. Every number is drawn before the flight; nothing reacts to the vehicle. A mover is placed
+move. Every number is drawn before the flight. Blind ones react to nothing but walls; social ones
+(`social`) want to move in the same way, and make way for walls, for one another and for the vehicle, which
+they see ten times a second. A mover is placed
 on air that is joined with the start, where its box meets no surface (so none starts inside a
 wall or on the far side of one), apart from all others, and no nearer to the start than the
 vehicle's stopping distance v^2 / (2 a) plus `start_margin_m`, surface to surface.
@@ -12,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import field
+from enum import StrEnum
 from typing import Annotated
 
 import numpy as np
@@ -20,6 +23,7 @@ from uavexp.arrays import Float, UInt8
 from uavexp.errors import WorldError, require
 from uavexp.movers.motion import POSITION, REST, WAY, Mode, advance, is_blocked
 from uavexp.movers.placing import Air
+from uavexp.movers.social import advance_among, desired_mps
 from uavexp.movers.timeline import Timeline, row_of
 from uavexp.parameters import NonNegative, Positive, PositiveShare, Range, Share, between, option
 from uavexp.scene import Scene
@@ -27,7 +31,15 @@ from uavexp.types import Bodies, Limits, Shape, World
 
 _CHUNK = 1000  # rows made at once
 _ATTEMPTS = 300  # drawings of a mover before giving up
+_LOOK = 10  # rows from one look around to the next
 _CIRCLE_STEP_M = 0.05  # between the places of a circle that are tested
+
+
+class Reaction(StrEnum):
+    """Whether movers look where they go."""
+
+    BLIND = "blind"
+    SOCIAL = "social"
 
 
 @option
@@ -52,11 +64,16 @@ class Mixed:
     # paper 2: "damped" [ours]
     start_margin_m: NonNegative = 0.75  # m beyond the vehicle's stopping distance that no mover
     # starts within [ours]
+    reaction: Reaction = Reaction.BLIND  # blind (paper 2) | social: make way for walls, one another and the
+    # vehicle, by the social force of Moussaïd et al. 2009 [ours]
     _scene: Scene = field(init=False, repr=False)
     _bounds_m: tuple[Float, Float] = field(init=False, repr=False)  # (B, 3) of the centres, each
     _mode: UInt8 = field(init=False, repr=False)
     _state: Float = field(init=False, repr=False)
+    _motion: Float = field(init=False, repr=False)  # (B, 3) velocities of social ones
+    _vehicle: Float = field(init=False, repr=False)  # (7,) position, velocity, radius; NaN: not seen
     _timeline: Timeline = field(init=False, repr=False)
+    _rows: int = field(init=False, repr=False, default=0)  # of the timeline that are made
 
     def __post_init__(self) -> None:
         for one, other in (("linear_share", "circular_share"), ("sphere_share", "person_share")):
@@ -104,26 +121,40 @@ class Mixed:
                 )
                 raise WorldError(message)
         self._scene, self._bounds_m, self._mode, self._state = scene, (low, high), mode, state
+        self._motion = np.array([desired_mps(int(m), s, 0.0) for m, s in zip(mode, state, strict=True)])
+        self._vehicle = np.append(np.full(6, np.nan), limits.body_radius_m)
         nothing = np.empty((0, self.count, 3))
-        self._timeline = Timeline(shape, half, nothing, nothing)
+        self._timeline, self._rows = Timeline(shape, half, nothing, nothing), 0
+
+    def notice(self, position_m: Float, velocity_mps: Float) -> None:
+        """Where the vehicle is by now, position (3,) and velocity (3,): what social movers look at."""
+        self._vehicle[:3], self._vehicle[3:6] = position_m, velocity_mps
 
     def at(self, time_s: float) -> Bodies:
         """The bodies at a time >= 0; rows are made in chunks as they are asked for."""
-        while row_of(time_s) >= self._timeline.position_m.shape[0]:
+        while row_of(time_s) >= self._rows:
             self._go_on()
         return self._timeline.at(time_s, time_s)
 
     def _go_on(self) -> None:
-        """Add a chunk of rows."""
+        """Make more rows."""
         shape, half, position, velocity = self._timeline
-        more_m, more_mps = np.empty((_CHUNK, self.count, 3)), np.empty((_CHUNK, self.count, 3))
-        advance(
-            self._scene.grid, *self._bounds_m, self._mode, half, self.restitution,
-            self._state, position.shape[0], more_m, more_mps,
-        )  # fmt: skip
-        self._timeline = Timeline(
-            shape, half, np.concatenate([position, more_m]), np.concatenate([velocity, more_mps])
-        )
+        if self._rows == len(position):
+            more = np.empty((_CHUNK, self.count, 3))
+            position, velocity = np.concatenate([position, more]), np.concatenate([velocity, more])
+            self._timeline = Timeline(shape, half, position, velocity)
+        blind = self.reaction is Reaction.BLIND
+        first, end = self._rows, self._rows + (_CHUNK if blind else _LOOK)
+        grid, to_write = self._scene.grid, (first, position[first:end], velocity[first:end])
+        if blind:
+            advance(grid, *self._bounds_m, self._mode, half, self.restitution, self._state, *to_write)
+        else:
+            wall_m = self._scene.fixed_closest_point_m(self._state[:, POSITION])
+            advance_among(
+                grid, *self._bounds_m, self._mode, half, self.speed_mps[1], self._state, self._motion,
+                wall_m, self._vehicle, *to_write,
+            )  # fmt: skip
+        self._rows = end
 
     def _draw_body(self, rng: np.random.Generator) -> tuple[Shape, Float]:
         """Draw a shape and its half size (3,)."""

@@ -32,7 +32,7 @@ class Mode(IntEnum):
     ACCELERATED = 2
 
 
-_LINEAR, _CIRCULAR, _ACCELERATED = int(Mode.LINEAR), int(Mode.CIRCULAR), int(Mode.ACCELERATED)
+CIRCULAR, ACCELERATED = int(Mode.CIRCULAR), int(Mode.ACCELERATED)  # for kernels
 # columns of the state (B, 10): position, direction or velocity, then by mode
 # circular: centre x, y, radius, angular rate; accelerated: mean, swing, angular frequency, phase
 POSITION, WAY, REST = slice(0, 3), slice(3, 6), slice(6, 10)
@@ -85,7 +85,7 @@ def advance(
     for row in range(position.shape[0]):
         time_s = (first + row) * ROW_S
         for b in range(mode.shape[0]):
-            if mode[b] == _CIRCULAR:
+            if mode[b] == CIRCULAR:
                 x, y, radius, rate = state[b, 6], state[b, 7], state[b, 8], state[b, 9]
                 angle = math.atan2(state[b, 1] - y, state[b, 0] - x)
                 position[row, b] = state[b, :3]
@@ -96,7 +96,7 @@ def advance(
                 state[b, 1] = y + radius * math.sin(angle + rate * ROW_S)
                 continue
             speed, kept = 1.0, restitution
-            if mode[b] == _ACCELERATED:
+            if mode[b] == ACCELERATED:
                 speed = state[b, 6] + state[b, 7] * math.sin(state[b, 8] * time_s + state[b, 9])
                 kept = 1.0
             position[row, b] = state[b, :3]
