@@ -30,4 +30,4 @@ class Reacting(Movers, Protocol):
     """Movers that look where the vehicle is."""
 
     def notice(self, position_m: Float, velocity_mps: Float) -> None:
-        """Told after every step, before `at` is asked: where the vehicle is by now, (3,), and its velocity (3,)."""
+        """Where the vehicle is by now, (3,), and its velocity (3,); told before each step's `at`."""

@@ -1,4 +1,4 @@
-"""How people make way: the social force of Moussaïd et al. 2009, in the form of Helbing and Molnár 1995 (numba).
+"""How people make way: the social force of Moussaïd et al. 2009, after Helbing and Molnár 1995 (numba).
 
     dv/dt = (v_desired - v) / τ + Σ f_other + f_wall
     f_other = -A exp(-d/B) [exp(-(n' B θ)²) t + K exp(-(n B θ)²) n]
@@ -7,8 +7,8 @@
 with e the level direction to the other one, d how far it is, θ the angle from D to e (with the small
 bias ε B, so that nobody stops dead on), K its sign, and n the normal of t to the left. It slows one that is
 met ahead and turns it aside; the other is every other body and the vehicle. f_wall = a exp(-d_wall / b) away
-from the nearest surface. Bodies that overlap are pushed apart by k / m times the overlap (Moussaïd et al. 2011).
-The parameters are those fitted to people in a corridor, and nothing was tuned.
+from the nearest surface. Bodies that overlap are pushed apart by k / m times the overlap (Moussaïd et al.
+2011). The parameters are those fitted to people in a corridor, and nothing was tuned.
 
 Moussaïd, Helbing, Garnier, Johansson, Combe, Theraulaz, Proc. R. Soc. B 276 (2009), eqs. 2.1 to 3.5;
 Moussaïd, Helbing, Theraulaz, PNAS 108 (2011), eq. 3.

@@ -35,7 +35,7 @@ def test_force_is_that_of_the_paper(seed):
 
 def test_one_that_is_met_ahead_slows_and_turns_aside_the_one_behind_does_nothing():
     ahead, behind = (force_of(np.array([x, 0.0]), np.array([1.0, 0.0]), 0.0) for x in (2.0, -2.0))
-    assert ahead[0] < 0.0 and ahead[1] < 0.0  # to the right
+    assert (ahead < 0.0).all()  # back and to the right
     assert np.linalg.norm(behind) < 0.01 * np.linalg.norm(ahead)
     np.testing.assert_allclose(wall_force(np.array([0.0, 0.5]), 0.25), [0.0, -3.0 * math.exp(-2.5)])
 
