@@ -26,7 +26,7 @@ LAYERS = (
     {"export"},
     {"report"},
     {"study"},
-    {"show"},
+    {"show", "judge"},
     {"sweep"},
     {"cli"},
     {"__main__"},

@@ -184,7 +184,7 @@ def _draw_header(sheet: Page, world: World, log: TrialLog, metrics: Values, titl
     left = LEFT_IN / WIDTH_IN
     names = [str(metrics[name]) for name in ("strategy",) if name in metrics] + [world.name]
     names += [f"seed {metrics['seed']}"] if "seed" in metrics else []
-    ending = str(log.outcome) + (
+    ending = str(metrics.get("outcome", log.outcome)) + (
         f" ({textwrap.shorten(log.reason, 80, placeholder=' …')})" if log.reason else ""
     )
     head = f"{' · '.join(names)}: {ending}"
