@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import multiprocessing
 import os
@@ -83,6 +84,20 @@ def _kill_supervisor(_: Any) -> None:
     time.sleep(60.0)
 
 
+def _answer_half(_: Any) -> None:
+    """Write the head of a message of 1 MB to the supervisor's pipe, a byte of it, and stop."""
+    for name in os.listdir("/proc/self/fd"):
+        with contextlib.suppress(OSError):
+            if os.readlink(f"/proc/self/fd/{name}").startswith("socket:"):
+                os.write(int(name), (1_000_000).to_bytes(4, "big") + b"x")
+    os.kill(os.getpid(), signal.SIGSTOP)
+
+
+def _stop_parent_and_sleep(_: Any) -> None:
+    os.kill(os.getppid(), signal.SIGSTOP)
+    time.sleep(60.0)
+
+
 def _spin(seconds: float) -> None:
     """Hold the interpreter in C code: no Python thread of this process runs meanwhile."""
     ctypes.PyDLL(None).usleep(int(seconds * 1e6))
@@ -115,4 +130,6 @@ DEEDS = {
     "print_frame": _print_frame,
     "note_and_sleep": _note_and_sleep,
     "note_and_spin": _note_and_spin,
+    "answer_half": _answer_half,
+    "stop_parent_and_sleep": _stop_parent_and_sleep,
 }

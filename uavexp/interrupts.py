@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import resource
 import signal
 import sys
 from collections.abc import Callable
@@ -10,19 +12,50 @@ from types import FrameType
 
 from uavexp.errors import UavexpError, one_line
 
+_FILES, _FEWEST_FILES = 4096, 64  # open at a time
+_REFUSALS = (
+    errno.EAGAIN, errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ENOSPC, errno.EDQUOT, errno.EIO,
+    errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS, errno.ESTALE,
+)  # fmt: skip
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)  # SIGTERM would lose the table of what has flown
 
 
 def exit_code_of(command: Callable[[], int]) -> int:
     """Run a command; its own exit code, or 1 or 2 for what the user can mend, or 130 when interrupted."""
     try:
+        _allow_files()
         return command()
     except UavexpError as error:
         sys.stderr.write(f"error: {one_line(error)}\n")
-        return error.exit_code
+        return 1 if _is_refused(error.__cause__) else error.exit_code
+    except OSError as error:
+        if not _is_refused(error):
+            raise
+        sys.stderr.write(f"error: the system refuses what is needed: {one_line(error)}\n")
+        return 1
     except KeyboardInterrupt:
         sys.stderr.write("interrupted\n")
         return 130
+
+
+def _is_refused(error: BaseException | None) -> bool:
+    """Whether the system, not what was typed, is at fault."""
+    return isinstance(error, OSError) and error.errno in _REFUSALS
+
+
+def _allow_files() -> None:
+    """Let this process open as many files as it may, at most a few thousand.
+
+    Raises:
+        UavexpError: those are too few.
+    """
+    allowed, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if allowed < _FILES and (most == resource.RLIM_INFINITY or most > allowed):
+        allowed = _FILES if most == resource.RLIM_INFINITY else min(_FILES, most)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (allowed, most))
+    if allowed < _FEWEST_FILES:
+        words = f"only {allowed} files may be open at a time, a command needs {_FEWEST_FILES}: ulimit -n 1024"
+        raise UavexpError(words) from OSError(errno.EMFILE, os.strerror(errno.EMFILE))
 
 
 def leave_at_once() -> None:

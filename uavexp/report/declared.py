@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import importlib
 import inspect
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,6 +37,7 @@ TABLES, FIGURES, CLAIMS = "tables", "figures", "claims"
 _TABLE_1 = [metric.column for metric in TABLE_1]
 _SUMMARY = {"name": "summary", "metrics": [*_TABLE_1, "detour", "time_below_safety_s"]}
 _DEFAULTS: dict[str, list[Any]] = {TABLES: [{"by_arm": _SUMMARY}], FIGURES: ["success"], CLAIMS: []}
+_FILE_NAME = re.compile(r"\w{1,100}")
 _CLAIM_KEYS = ("says", "source", "judge", "among", "each")
 
 
@@ -116,6 +118,8 @@ def _part(kind: str, item: Any, default: tuple[Metric, ...]) -> Part:
     if make is None:
         raise ConfigError(f"{kind}: {found} has no function {kind[:-1]}")
     name = str(options.get("name", found.rpartition(".")[2]))
+    if not _FILE_NAME.fullmatch(name):
+        raise ConfigError(f"{kind}: {found}: a name may hold letters, digits and _, got {name[:60]!r}")
     given = {key: value for key, value in options.items() if key != "name"}
     if "metrics" in _parameters(make):
         given.setdefault("metrics", [metric.column for metric in default])

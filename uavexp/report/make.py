@@ -17,6 +17,7 @@ from uavexp.report import style, table_formats
 from uavexp.report.contents import Report
 from uavexp.report.figures.base import Drawing
 from uavexp.report.tables.base import Table
+from uavexp.store.files import opened, own_folder
 from uavexp.store.records import RECORD, write_atomically, write_text
 from uavexp.store.study import Study, collect, read_study, trial_folders
 from uavexp.store.table import REPLANS, TABLE
@@ -25,6 +26,7 @@ PAGE, CLAIMS = "report.html", "claims"
 TABLES, FIGURES = "tables", "figures"
 MANIFEST = ".report"  # names of the files that a report made
 _OWN = re.compile(rf"{CLAIMS}\.(csv|md)|{TABLES}/\w+\.(csv|md|tex)|{FIGURES}/\w+\.(png|pdf)")
+_MOST_NAMES = 1_000_000  # bytes of a manifest
 DPI = 200
 # no clock, no version of a library: the same figure, the same bytes
 _METADATA: dict[str, dict[str, Any]] = {
@@ -65,7 +67,10 @@ def _remove_stale(folder: Path, files: Iterable[Path]) -> None:
     """Remove what an earlier report of this folder made and this one did not; nothing else."""
     made = {file.relative_to(folder).as_posix() for file in files}
     manifest = folder / MANIFEST
-    before = manifest.read_text(encoding="utf-8").splitlines() if manifest.is_file() else []
+    before: list[str] = []
+    if manifest.exists():
+        with opened(manifest, _MOST_NAMES) as file:
+            before = file.read().decode(errors="replace").splitlines()
     for name in before:
         if name not in made and _OWN.fullmatch(name):
             (folder / name).unlink(missing_ok=True)
@@ -87,20 +92,13 @@ def _bring_up_to_date(study: Study, say: Say) -> None:
 
 
 def _write_tables(report: Report, folder: Path) -> Iterator[Path]:
-    _make_folder(folder / TABLES)
+    own_folder(folder, TABLES)
     for table in report.tables:
         yield from _write_table(table, folder / TABLES / table.name)
     yield _write(folder / TABLES / f"{report.values.name}.csv", table_formats.to_csv(report.values))
     if report.judgements:
         yield _write(folder / f"{CLAIMS}.csv", table_formats.to_csv(report.claims))
         yield _write(folder / f"{CLAIMS}.md", table_formats.to_markdown(report.claims))
-
-
-def _make_folder(folder: Path) -> None:
-    try:
-        folder.mkdir(exist_ok=True)
-    except OSError as error:
-        raise RecordError(f"{folder}: cannot be made ({error.strerror})") from error
 
 
 def _write_table(table: Table, stem: Path) -> Iterator[Path]:
@@ -121,7 +119,7 @@ def _write_figures_and_page(report: Report, say: Say, warn: Say) -> Iterator[Pat
     from uavexp.report.html import write_html
 
     folder = report.study.folder
-    _make_folder(folder / FIGURES)
+    own_folder(folder, FIGURES)
     drawn: list[tuple[Drawing, Path]] = []
     left_out: list[str] = []
     for drawing in report.drawings(left_out.append, say):

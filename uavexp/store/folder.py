@@ -7,6 +7,7 @@ import fcntl
 import os
 import re
 import shutil
+import stat
 import tempfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -15,6 +16,7 @@ from typing import IO
 from uavexp.config.composition import CommandLine
 from uavexp.errors import ConfigError, RecordError
 from uavexp.paths import outputs_root
+from uavexp.store.files import own_folder
 from uavexp.store.records import write_bytes
 from uavexp.store.study import ASIDE, STUDY, TRIALS, WORLDS
 from uavexp.store.table import TABLE
@@ -126,10 +128,7 @@ def _lock_file(folder: Path) -> IO[str]:
     the file that was locked is still the one of that name.
     """
     while True:
-        try:
-            file = (folder / LOCK).open("a+")
-        except OSError as error:
-            raise RecordError(f"{folder}: cannot be locked ({error.strerror})") from error
+        file = _opened_lock(folder)
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             if (folder / LOCK).stat().st_ino == os.fstat(file.fileno()).st_ino:
@@ -143,7 +142,28 @@ def _lock_file(folder: Path) -> IO[str]:
             ) from error
         except FileNotFoundError:  # removed between the opening and the locking
             pass
+        except OSError as error:
+            file.close()
+            if not (folder / STUDY).exists():
+                (folder / LOCK).unlink(missing_ok=True)
+            raise RecordError(
+                f"{folder}: its file system cannot lock a file ({error.strerror}), and two commands "
+                "might fly into it at once; name a folder on another one with out=DIR"
+            ) from error
         file.close()
+
+
+def _opened_lock(folder: Path) -> IO[str]:
+    """The lock file, made if it is not there; no link is followed, no pipe waited for."""
+    try:
+        flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
+        file = os.fdopen(os.open(folder / LOCK, flags, 0o666), "a+")
+    except OSError as error:
+        raise RecordError(f"{folder}: cannot be locked ({error.strerror})") from error
+    if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+        return file
+    file.close()
+    raise RecordError(f"{folder / LOCK} is no regular file; move it away")
 
 
 def put_trial(folder: Path, name: str, files: Mapping[str, bytes]) -> None:
@@ -154,9 +174,10 @@ def put_trial(folder: Path, name: str, files: Mapping[str, bytes]) -> None:
     """
     trial = folder / TRIALS / name
     part = trial.with_name(f".{name}{_PART}")
+    own_folder(folder, TRIALS)
     try:
         shutil.rmtree(part, ignore_errors=True)
-        part.mkdir(parents=True)
+        part.mkdir()
         for file, data in files.items():
             _write(part / file, data)
         _sync(part)
@@ -177,9 +198,8 @@ def put_world(folder: Path, digest: str, data: bytes) -> None:
         RecordError: it cannot be written.
     """
     file = folder / WORLDS / f"{digest}.npz"
+    own_folder(folder, WORLDS)
     if not file.is_file() or file.read_bytes() != data:
-        with contextlib.suppress(FileExistsError):
-            file.parent.mkdir()
         write_bytes(file, data)
 
 
@@ -200,7 +220,7 @@ def remove_unfinished(folder: Path) -> int:
         *(folder / WORLDS).glob(f".*{_PART}"),
     ]
     for piece in pieces:
-        if piece.is_dir():
+        if piece.is_dir() and not piece.is_symlink():
             shutil.rmtree(piece)
         else:
             piece.unlink()

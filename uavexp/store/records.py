@@ -24,6 +24,7 @@ import numpy as np
 
 from uavexp.errors import RecordError
 from uavexp.paths import PACKAGE, checkout_root
+from uavexp.store.files import json_of
 
 SCHEMA = 2
 RECORD, WALL, LOG, PICTURE = "record.json", "wall.json", "log.npz", "picture.png"
@@ -67,7 +68,7 @@ def seal(record: Mapping[str, Any]) -> str:
 
 
 def read_record(path: Path) -> dict[str, Any]:
-    """Read a record and verify its sha256.
+    """Read a record, verify its sha256 and check its parts.
 
     Args:
         path: of a `record.json`, or of the folder that holds one.
@@ -77,22 +78,20 @@ def read_record(path: Path) -> dict[str, Any]:
 
     Raises:
         OtherVersionError: of another schema.
-        RecordError: missing, not JSON, or changed since it was written.
+        RecordError: missing, not JSON, changed since it was written, or of no trial.
     """
+    from uavexp.store.parts import check_record  # metrics, which the start of a command need not wait for
+
     file = path / RECORD if path.is_dir() else path
-    try:
-        record = json.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise RecordError(f"{file}: cannot be read ({error.strerror})") from error
-    except (ValueError, RecursionError) as error:
-        raise RecordError(f"{file}: damaged, not JSON") from error
-    if not isinstance(record, dict) or "sha256" not in record:
+    record = json_of(file)
+    if "sha256" not in record:
         raise RecordError(f"{file}: damaged, no sha256")
     if record.pop("sha256") != digest(record):
         raise RecordError(f"{file}: damaged, its content does not match its sha256")
     if record.get("schema") != SCHEMA:
         raise OtherVersionError(f"{file}: schema {record.get('schema')}, this version reads {SCHEMA}")
-    record["metrics"] = {key: restore(value) for key, value in record.get("metrics", {}).items()}
+    check_record(file, record)
+    record["metrics"] = {key: restore(value) for key, value in record["metrics"].items()}
     return record
 
 

@@ -14,16 +14,17 @@ so that a trial repeated by itself has the same record.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from uavexp.errors import RecordError
+from uavexp.errors import RecordError, one_line
 from uavexp.log import TrialLog
+from uavexp.store.files import json_of, opened
 from uavexp.store.logs import read_log
+from uavexp.store.parts import check_study, check_table, is_run, is_wall
 from uavexp.store.records import LOG, WALL, canonical_json, cell_digest, read_record, trial_name
 from uavexp.store.table import (
     FIRST_OF_REPLANS,
@@ -44,6 +45,8 @@ if TYPE_CHECKING:
 STUDY, RUN = "study.json", "run.json"
 TRIALS, WORLDS = "trials", "worlds"
 ASIDE = ".aside-"
+_MOST_CELLS = 500_000_000  # of a table
+_MOST_WORDS = 300  # of what a library says of a bad file
 _REPORTED = ("p_trigger_", "p_planner_unknown")  # parameters that figures and notes show
 
 
@@ -76,19 +79,22 @@ class Study:
     @cached_property
     def trials(self) -> pd.DataFrame:
         """One row per trial (columns in `uavexp.store.table`), axes as plain text columns."""
-        return _read(self.folder / TABLE)
+        return self._table(TABLE)
 
     @cached_property
     def measurements(self) -> pd.DataFrame:
         """The columns of `trials` that reports read: all but the parameters of most groups."""
-        return _read(
-            self.folder / TABLE, lambda name: not name.startswith("p_") or name.startswith(_REPORTED)
-        )
+        return self._table(TABLE, lambda name: not name.startswith("p_") or name.startswith(_REPORTED))
 
     @cached_property
     def replans(self) -> pd.DataFrame:
         """One row per planning request: trial, axes, seed, and the fields of `types.Replan` but arrays."""
-        return _read(self.folder / REPLANS)
+        return self._table(REPLANS)
+
+    def _table(self, name: str, wanted: Callable[[str], bool] = lambda name: True) -> pd.DataFrame:
+        table = _read(self.folder / name, wanted)
+        check_table(self.folder / name, table, self.axes if name == TABLE else None)
+        return table
 
     def has_log(self, trial: str) -> bool:
         """Whether the log of this trial (column `trial`) lies in the folder."""
@@ -118,22 +124,20 @@ def read_study(folder: Path) -> Study:
         RecordError: no study, or a damaged one.
     """
     file = folder / STUDY
-    try:
-        text = json.loads(file.read_text(encoding="utf-8"))
-        return Study(
-            folder=folder,
-            name=text["name"],
-            title=text["title"],
-            report=dict(text["report"]),
-            axes={name: tuple(values) for name, values in text["axes"]},
-            seeds=tuple(text["seeds"]),
-            settings=text["settings"],
-            cells=tuple(StudyCell(**cell) for cell in text["cells"]),
-        )
-    except OSError as error:
-        raise RecordError(f"{folder} holds no study: {STUDY} cannot be read ({error.strerror})") from error
-    except (ValueError, KeyError, TypeError) as error:
-        raise RecordError(f"{file}: damaged ({error})") from error
+    if not file.exists():
+        raise RecordError(f"{folder} holds no study: {STUDY} is missing")
+    text = json_of(file)
+    check_study(file, text)
+    return Study(
+        folder=folder,
+        name=text["name"],
+        title=text["title"],
+        report=text["report"],
+        axes={name: tuple(values) for name, values in text["axes"]},
+        seeds=tuple(text["seeds"]),
+        settings=text["settings"],
+        cells=tuple(StudyCell(**cell) for cell in text["cells"]),
+    )
 
 
 def study_text(study: Study) -> str:
@@ -200,30 +204,33 @@ def trial_folders(folder: Path) -> Iterator[Path]:
 
 def read_wall(trial: Path) -> dict[str, Any]:
     """Clock times and command of a trial; empty when they are not there."""
-    return _unsealed(trial / WALL)
+    wall = _unsealed(trial / WALL)
+    return wall if is_wall(wall) else {}
 
 
 def read_runs(folder: Path) -> list[dict[str, Any]]:
     """Every time a command flew into this folder: command, machine, clock times."""
-    return list(_unsealed(folder / RUN).get("runs", []))
+    runs = _unsealed(folder / RUN).get("runs", [])
+    return [run for run in runs if is_run(run)] if isinstance(runs, list) else []
 
 
 def _unsealed(file: Path) -> dict[str, Any]:
     """A JSON file that no result depends on; empty when missing or damaged."""
     try:
-        content = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        return json_of(file)
+    except RecordError:
         return {}
-    return content if isinstance(content, dict) else {}
 
 
 def _read(file: Path, wanted: Callable[[str], bool] = lambda name: True) -> pd.DataFrame:
     from pyarrow import ArrowException, parquet
 
     try:
-        columns = [name for name in parquet.read_schema(file).names if wanted(name)]
-        table = parquet.read_table(file, columns=columns, page_checksum_verification=True)
-        frame: pd.DataFrame = table.to_pandas()
-        return frame
-    except (OSError, ArrowException) as error:
-        raise RecordError(f"{file}: cannot be read ({error})") from error
+        with opened(file) as data, parquet.ParquetFile(data, page_checksum_verification=True) as table:
+            columns = [name for name in table.schema_arrow.names if wanted(name)]
+            if table.metadata.num_rows * len(columns) > _MOST_CELLS:
+                raise RecordError(f"{file}: {table.metadata.num_rows} rows, more than any study has")
+            frame: pd.DataFrame = table.read(columns).to_pandas(ignore_metadata=True)
+            return frame
+    except (OSError, ArrowException, ValueError, MemoryError) as error:
+        raise RecordError(f"{file}: cannot be read ({one_line(error)[:_MOST_WORDS]})") from error

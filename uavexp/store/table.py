@@ -183,7 +183,7 @@ def parameters(config: Mapping[str, Any]) -> Row:
 def _parameter(column: str, value: Any) -> Row:
     """A parameter's column; of an option that is held: its name, and columns of its parameters."""
     if isinstance(value, Mapping) and _TARGET in value:
-        row: Row = {column: str(value[_TARGET]).split(".")[-2]}
+        row: Row = {column: str(value[_TARGET]).rpartition(".")[0].rpartition(".")[2]}
         for key, item in value.items():
             if key != _TARGET:
                 row |= _parameter(f"{column}_{key}", item)
@@ -193,10 +193,10 @@ def _parameter(column: str, value: Any) -> Row:
 
 def _clock(wall: Mapping[str, Any]) -> Row:
     row = {name: value for name, value in wall.items() if name.startswith("wall_")}
-    if "command" in wall:
+    if wall.get("command"):
         row["wall_command"] = wall["command"]
-    for part, lap in wall.get("laps", {}).items():
-        row |= {f"wall_{part}_{kind}": lap[kind] for kind in _LAP_KINDS}
+    for part, lap in (wall.get("laps") or {}).items():
+        row |= {f"wall_{part}_{kind}": lap[kind] for kind in _LAP_KINDS if kind in lap}
     return row
 
 

@@ -21,6 +21,7 @@ from uavexp.store.records import Status
 from uavexp.sweep.faults import failure
 from uavexp.sweep.job import Answer, Call
 
+REFUSED = os.EX_TEMPFAIL  # exit code of a child to which the system refuses its second thread
 _PR_SET_PDEATHSIG = 1
 _SIZE = Path("/proc/self/statm")
 _MOST_CALLS = 30  # of one child: so many share what a fresh one costs
@@ -41,7 +42,10 @@ def run_child(connection: Connection, call: Call, memory_mb: float) -> None:
     try:
         _redirect_output(recv_handle(connection))
         die_with_parent()
-        _die_with_supervisor()
+        try:
+            _die_with_supervisor()
+        except RuntimeError:
+            os._exit(REFUSED)
         most_mb = _size_mb() + _GROWTH_MB
         for left in reversed(range(_MOST_CALLS)):
             went_well, answer = _answer(call, connection.recv(), connection, memory_mb)

@@ -9,6 +9,7 @@ that a crash, a hang or a hunger for memory costs that job alone.
 from __future__ import annotations
 
 import contextlib
+import errno
 import multiprocessing
 import os
 import pickle
@@ -17,7 +18,7 @@ import tempfile
 import threading
 import time
 import warnings
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from multiprocessing import forkserver, resource_tracker
@@ -26,8 +27,9 @@ from multiprocessing.context import ForkServerProcess
 from multiprocessing.reduction import send_handle
 from typing import IO, Any
 
+from uavexp.errors import UavexpError
 from uavexp.store.records import Status
-from uavexp.sweep.child import run_child
+from uavexp.sweep.child import REFUSED, run_child
 from uavexp.sweep.faults import death
 from uavexp.sweep.job import Allowance, Answer, Call, Done, Job
 
@@ -45,13 +47,55 @@ def start_fork_server(preload: Sequence[str] = ()) -> None:
         preload: modules that it imports once, for all children.
     """
     multiprocessing.get_context("forkserver").set_forkserver_preload([_TETHER, *preload])
-    resource_tracker.ensure_running()  # else the server starts it, which unblocks the signal
-    # the server inherits the mask: the terminal's Ctrl-C is the supervisor's to handle, right after this
-    ours = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    _ensure_fork_server()
+
+
+def _ensure_fork_server() -> None:
+    """Start the fork server, if none runs, with what it is to import known."""
+    with _refusals_told():
+        resource_tracker.ensure_running()  # else the server starts it, which unblocks the signal
+        # the server inherits the mask: Ctrl-C is the supervisor's to handle, right after this
+        ours = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            forkserver.ensure_running()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, ours)
+
+
+def _kill_fork_server() -> None:
+    """Kill a fork server that does not answer; who waits for it hears its end, a new one is started."""
+    pid = forkserver._forkserver._forkserver_pid  # type: ignore[attr-defined]
+    if pid is not None:
+        with contextlib.suppress(ProcessLookupError, ChildProcessError):
+            os.kill(pid, signal.SIGKILL)
+            os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)  # dead, for multiprocessing to find
+
+
+class RefusedError(UavexpError):
+    """The system refuses a process, a thread or an open file."""
+
+    exit_code = 1  # no fault of what was typed
+
+
+@contextlib.contextmanager
+def _refusals_told(*others: type[Exception]) -> Iterator[None]:
+    """Say in one line what the system refuses.
+
+    Args:
+        others: errors that it comes out as, besides those of Python itself.
+
+    Raises:
+        RefusedError: it does; or the fork server, refused a process, has ended.
+    """
+    kinds: tuple[type[Exception], ...] = (OSError, EOFError, RuntimeError, *others)
     try:
-        forkserver.ensure_running()
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, ours)
+        yield
+    except kinds as error:
+        words = getattr(error, "strerror", None) or error
+        raise RefusedError(
+            f"no process can be started for a trial ({words}); fly fewer at a time, runner.n_jobs=1, or "
+            "raise what the system allows (ulimit -n files, ulimit -u processes)"
+        ) from error
 
 
 def run_local(
@@ -77,7 +121,8 @@ def run_local(
 
     supervisor = _Supervisor(call=call, limits=limits, watch=watch)
     pool = Parallel(n_jobs=n_jobs, backend="threading", return_as="generator_unordered", batch_size=1)
-    results = pool(delayed(supervisor.run)(job) for job in jobs)
+    with _refusals_told(AttributeError):  # as which a pool that lacks a thread ends
+        results = pool(delayed(supervisor.run)(job) for job in jobs)
     try:
         # not `yield from`: when closed, the children must be killed before joblib waits for them
         for done in results:  # noqa: UP028
@@ -123,23 +168,43 @@ class _Supervisor:
     _stopped: bool = False
 
     def run(self, job: Job) -> Done:
-        """Run one job to its end, whatever that is."""
-        child = self._starter.submit(self._take).result()
+        """Run one job to its end, whatever that is.
+
+        Raises:
+            RefusedError: the system refuses a process.
+        """
         begin_s = time.monotonic()
-        if child is None:
-            answer = Answer(status=Status.KILLED, reason="the sweep was stopped")
+        with _refusals_told():
+            taken = self._starter.submit(self._take)
+        try:
+            child = taken.result(self.limits.timeout_s)
+        except TimeoutError:
+            _kill_fork_server()
+            answer = self._hung
         else:
-            answer = self._ask(child, job, begin_s + self.limits.timeout_s)
+            begin_s = time.monotonic()
+            stopped = Answer(status=Status.KILLED, reason="the sweep was stopped")
+            answer = stopped if child is None else self._ask(child, job)
         return Done(job=job, answer=answer, wall_s=time.monotonic() - begin_s)
+
+    @property
+    def _hung(self) -> Answer:
+        return Answer(status=Status.HUNG, reason=f"not done after {self.limits.timeout_s:g} s")
 
     def stop(self) -> None:
         """Kill every child, wait until it is gone, and let no other start."""
-        with self._lock:
-            self._stopped = True
+        self._stopped = True
+        if not self._lock.acquire(timeout=_PARTING_S):
+            _kill_fork_server()  # for which a start waits
+            self._lock.acquire()
+        try:
             for child in self._living:
                 _kill(child.process)
+            _await_end(*self._living)
             for child in self._living:
-                child.process.join(_PARTING_S)
+                child.process.join()
+        finally:
+            self._lock.release()
 
     def _take(self) -> _Child | None:
         """A child that waits for a call, a new one if none does; None when the sweep was stopped."""
@@ -155,35 +220,63 @@ class _Supervisor:
         return child
 
     def _start(self) -> _Child:
-        context = multiprocessing.get_context("forkserver")
-        ours, theirs = context.Pipe()
-        with theirs:
-            arguments = (theirs, self.call, self.limits.memory_mb)
-            process = context.Process(target=run_child, args=arguments, daemon=True)
-            process.start()
-        return _Child(process=process, connection=ours, printed=tempfile.TemporaryFile(buffering=0))
+        """A new child; once more with a new fork server, if the one that there is has died."""
+        try:
+            return self._start_once()
+        except RefusedError:
+            _kill_fork_server()
+            return self._start_once()
 
-    def _ask(self, child: _Child, job: Job, deadline_s: float) -> Answer:
+    def _start_once(self) -> _Child:
+        context = multiprocessing.get_context("forkserver")
+        with _refusals_told():
+            printed = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115
+            ours, theirs = context.Pipe()
+            with theirs:
+                arguments = (theirs, self.call, self.limits.memory_mb)
+                process = context.Process(target=run_child, args=arguments, daemon=True)
+                _ensure_fork_server()
+                process.start()
+        return _Child(process=process, connection=ours, printed=printed)
+
+    def _ask(self, child: _Child, job: Job) -> Answer:
         """Have a child do a job, and keep it for another one if all went well."""
-        child.begin(job.payload)
-        answer, last = self._wait(job, child, deadline_s)
-        if answer is not None and not last:
+        deadline_s = time.monotonic() + self.limits.timeout_s
+        with self._killed_in_time(child):
+            child.begin(job.payload)
+            answer, last = self._wait(job, child)
+        late = time.monotonic() >= deadline_s
+        if answer is not None and not last and not late:
             self._idle.append(child)
             return answer
         with child.connection, child.printed:
-            hung = answer is not None and answer.status is Status.HUNG
-            exit_code = self._end(child, grace_s=0.0 if hung else _PARTING_S)
-            return answer or death(exit_code, _tail(child.printed))
+            exit_code = self._end(child, grace_s=0.0 if late else _PARTING_S)
+            if answer is None and exit_code == REFUSED:
+                with _refusals_told():
+                    raise OSError(errno.EAGAIN, os.strerror(errno.EAGAIN))
+            return answer or (self._hung if late else death(exit_code, _tail(child.printed)))
 
-    def _wait(self, job: Job, child: _Child, deadline_s: float) -> tuple[Answer | None, bool]:
+    @contextlib.contextmanager
+    def _killed_in_time(self, child: _Child) -> Iterator[None]:
+        """Kill a child at its deadline, whatever it and this thread wait for then: one in mid-answer, too."""
+        timer = threading.Timer(self.limits.timeout_s, _kill, [child.process])
+        timer.daemon = True
+        with _refusals_told():
+            timer.start()
+        try:
+            yield
+        finally:
+            timer.cancel()
+
+    def _wait(self, job: Job, child: _Child) -> tuple[Answer | None, bool]:
         """The child's answer, None when it died without one; and whether that was its last."""
         connection, sentinel = child.connection, child.process.sentinel
-        while (left_s := deadline_s - time.monotonic()) > 0.0:
-            ready = wait([connection, sentinel], timeout=left_s)
-            if connection not in ready and ready and not connection.poll():
+        while True:
+            ready = wait([connection, sentinel])
+            if connection not in ready and not connection.poll():
                 return None, True
             try:
-                message = connection.recv() if ready else None
+                message = connection.recv()
             except (EOFError, OSError):
                 return None, True
             match message:
@@ -192,20 +285,27 @@ class _Supervisor:
                 case time_s, words:
                     if self.watch is not None:
                         self.watch(job, time_s, words)
-        return Answer(status=Status.HUNG, reason=f"not done after {self.limits.timeout_s:g} s"), True
 
     def _end(self, child: _Child, grace_s: float) -> int | None:
         """Let a child end, or end it; its exit code."""
         process = child.process
-        wait([process.sentinel], timeout=grace_s)
-        if not wait([process.sentinel], timeout=0.0):
+        if not wait([process.sentinel], timeout=grace_s):
             _kill(process)
-            wait([process.sentinel])
+            _await_end(child)
         with self._lock:
             process.join()
             self._living.discard(child)
             code: int | None = process.exitcode
         return code
+
+
+def _await_end(*children: _Child) -> None:
+    """Wait until killed children are gone; the fork server, which tells of it, may itself be stopped."""
+    end_s = time.monotonic() + _PARTING_S
+    for child in children:
+        if not wait([child.process.sentinel], timeout=max(0.0, end_s - time.monotonic())):
+            _kill_fork_server()
+            return
 
 
 def _kill(process: ForkServerProcess) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import multiprocessing
 import signal
 from collections.abc import Generator, Sequence
@@ -100,7 +101,12 @@ def _fly_agenda(agenda: Agenda, command: CommandLine, audience: Audience, run: R
                 if (folder / STUDY).exists():
                     run.note(folder, _ending(error, folder), kept, failed)
                     collect(folder)
-            audience.stopped(folder, kept, len(agenda.left), again=bool(command.out or command.experiment))
+            audience.stopped(
+                folder,
+                kept if (folder / STUDY).exists() else 0,
+                len(agenda.left),
+                again=bool(command.out or command.experiment),
+            )
             raise
     if not agenda.left:
         _begin(agenda, run)
@@ -174,7 +180,14 @@ def _begin(agenda: Agenda, run: Run) -> None:
 
 
 def _keep(folder: Path, done: Done) -> None:
-    """Write a trial; its world first, so that the record vouches for it."""
+    """Write a trial; its world first, so that the record vouches for it.
+
+    Raises:
+        RecordError: it cannot be written, or the folder is no longer there.
+    """
+    if not (folder / STUDY).exists():
+        words = f"{folder} was deleted or moved while this command flew; the same command begins it anew"
+        raise RecordError(words) from OSError(errno.ESTALE, "deleted or moved")
     if done.answer.status is Status.OK:
         digest, data = done.answer.value.world
         if data is not None:

@@ -1,5 +1,25 @@
-"""Imported by the fork server alone, where it ties that process to the supervisor's life."""
+"""Imported by the fork server alone: ties it to the supervisor's life, and has it fork patiently."""
+
+import os
+import sys
+import time
 
 from uavexp.sweep.child import die_with_parent
 
+_TRIES, _PAUSE_S = 20, 0.1
+_fork = os.fork
+
+
+def _fork_patiently() -> int:
+    """Fork; the system may refuse for a moment, when many processes are there."""
+    for _ in range(_TRIES):
+        try:
+            return _fork()
+        except OSError:
+            time.sleep(_PAUSE_S)
+    return _fork()
+
+
 die_with_parent()
+os.fork = _fork_patiently
+sys.excepthook = lambda *error: None  # the supervisor hears of its end, and tells it in one line

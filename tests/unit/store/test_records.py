@@ -119,9 +119,8 @@ def test_numpy_values_are_written_as_what_they_are() -> None:
 
 
 def test_a_record_comes_back_with_its_nan(tmp_path: Path) -> None:
-    write_text(
-        tmp_path / "record.json", seal({"seed": 0, "metrics": {"x": math.nan, "y": math.inf, "z": 0.1}})
-    )
+    metrics = {"x": math.nan, "y": math.inf, "z": 0.1}
+    write_text(tmp_path / "record.json", seal({**RECORD, "metrics": metrics}))
     metrics = read_record(tmp_path)["metrics"]
     assert math.isnan(metrics["x"])
     assert metrics["y"] == math.inf
@@ -272,7 +271,15 @@ RECORD = {
     "metrics": {"outcome": "reached", "success": True, "tracking_error_m": math.nan},
     "world": {"digest": "d", "clutter_density": 0.1, "narrowest_gap_m": "inf", "straight_line_m": 3.0},
     "replans": [
-        {"time_s": 0.5, "effective_s": None, "cause": "first", "position_m": [1, 2, 3], "goal_m": [4, 5, 6]}
+        {
+            "time_s": 0.5,
+            "effective_s": None,
+            "cause": "first",
+            "position_m": [1, 2, 3],
+            "goal_m": [4, 5, 6],
+            "status": "ok",
+            "path_change_m": None,
+        }
     ],
 }
 
