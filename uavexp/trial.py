@@ -212,17 +212,30 @@ class _Flight:
 
     def judge(self, observation: Observation) -> Judge:
         """Who is asked of every step: the mission, and now and then whether the vehicle still moves."""
+        pilot = self.craft.pilot
 
         def ending(first: int, end: int) -> Ending | None:
             found = self.parts.mission.outcome(self.craft.recorder.flown(first, end), observation)
-            if first % _LOOK_STEPS == 0 and (found is None or found[0] > 0) and self._is_still(first):
+            looks = first % _LOOK_STEPS == 0 and (found is None or found[0] > 0)
+            if looks and not pilot.recovers and self._is_still(first):
                 found = 0, Outcome.STUCK
+            if found is not None and found[1] is Outcome.EXPLORED and pilot.recovers:
+                found = None  # what is left may be beyond what it is stuck at
+            if found is None and pilot.given_up is not None:
+                found = 0, self._given_up(pilot.given_up)
             if found is None:
                 return None
-            unplanned = found[1] in (Outcome.STUCK, Outcome.EXPLORED) and not self.craft.pilot.ever_planned
+            unplanned = (
+                found[1] in (Outcome.STUCK, Outcome.UNREACHABLE, Outcome.EXPLORED) and not pilot.ever_planned
+            )
             return Ending(first + found[0], Outcome.NO_PLAN if unplanned else found[1])
 
         return ending
+
+    def _given_up(self, outcome: Outcome) -> Outcome:
+        """What it is to a mission that nothing more can be reached."""
+        nothing_left: Outcome = getattr(self.parts.mission, "nothing_left", Outcome.STUCK)
+        return nothing_left if outcome is Outcome.UNREACHABLE else outcome
 
     def _is_still(self, step: int) -> bool:
         stuck_steps = math.ceil(self.parts.stuck_s / self.parts.step_s)
@@ -254,6 +267,8 @@ class _Flight:
         if outcome is Outcome.TIMEOUT:
             return f"not there after {self.parts.mission.time_limit_s:g} s"
         failure = self.craft.pilot.failure
+        if self.craft.pilot.given_up is not None:
+            return f"gave up: {failure}"
         why = f"; {failure}" if failure else ", and nothing asked for a new plan"
         return f"has not moved for {self.parts.stuck_s:g} s{why}"
 
@@ -301,6 +316,7 @@ def _begin(parts: Parts, world: World, seed: int) -> _Flight:
         start_yaw_rad=world.start_yaw_rad,
         flight_bounds_m=world.flight_bounds_m,
         watch=watch,
+        note_obstacle=parts.mapping.note_obstacle,
     )
     scene.place(parts.movers.at(0.0))
     hover = _hover(world)

@@ -189,6 +189,14 @@ class PlanStatus(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Squeeze:
+    """A clearance below the usual ones and the speed at which it is flown, for a vehicle that is lost."""
+
+    clearance_m: float
+    speed_mps: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PlanRequest:
     """What a planner is told; everything it may use."""
 
@@ -202,6 +210,7 @@ class PlanRequest:
     tracks: Tracks = dataclasses.field(
         default_factory=Tracks.none
     )  # believed movers at the time of the request
+    squeeze: Squeeze | None = None  # to be tried where the usual clearances find no way
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -267,7 +276,8 @@ class Outcome(StrEnum):
     INSPECTED = "inspected"  # every viewpoint was visited or found unreachable
     TIMEOUT = "timeout"  # the mission's time limit passed
     NO_PLAN = "no_plan"  # no plan was ever found from the start
-    STUCK = "stuck"  # holding, and every goal has been tried and failed
+    STUCK = "stuck"  # holding, and nothing that was tried has got it on
+    UNREACHABLE = "unreachable"  # no way leads to the target through anything that may be free
     ERROR = "error"  # the trial itself raised; the record has the traceback
 
 

@@ -28,6 +28,9 @@ class MapBackend(Protocol):
     def mark_free(self, centre_m: Float, radius_m: float) -> None:
         """Declare a ball known free (the start bubble); measured surfaces override it."""
 
+    def note_obstacle(self, centre_m: Float, radius_m: float) -> None:
+        """Declare a ball an obstacle that was felt, not seen; no measurement overrides it."""
+
     def integrate(self, scan: Scan) -> None:
         """Fuse one scan (sensor rate)."""
 

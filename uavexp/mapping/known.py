@@ -23,7 +23,7 @@ from uavexp.errors import require
 from uavexp.field import FREE, OCCUPIED, DistanceField
 from uavexp.mapping.esdf import SignedDistance
 from uavexp.mapping.map_parameters import FieldParameters
-from uavexp.mapping.occupancy import grid_shape
+from uavexp.mapping.occupancy import ball, grid_shape
 from uavexp.mapping.tiles import count_changes, no_changes
 from uavexp.parameters import NonNegative, option
 from uavexp.scan import Scan
@@ -158,6 +158,10 @@ class Known(FieldParameters):
         air = (reached == 1) & (distance_m >= self.occupied_below_m)
         self._made = np.where(air, FREE, OCCUPIED).astype(np.uint8)
         _sheets(crossed, reached, distance_m, _SAME_M, self._made)
+
+    def note_obstacle(self, centre_m: Float, radius_m: float) -> None:
+        """Declare a ball an obstacle that was felt."""
+        self._made.reshape(-1)[ball(self._field, centre_m, radius_m)] = OCCUPIED
 
     def integrate(self, scan: Scan) -> None:
         """Learn nothing: all is known."""

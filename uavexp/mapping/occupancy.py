@@ -38,7 +38,7 @@ from typing import NamedTuple
 import numba as nb
 import numpy as np
 
-from uavexp.arrays import Float, Float32, Int32, UInt8
+from uavexp.arrays import Float, Float32, Int, Int32, UInt8
 from uavexp.errors import WorldError
 from uavexp.field import FREE, OCCUPIED, UNKNOWN, DistanceField
 from uavexp.mapping.esdf import SignedDistance
@@ -172,6 +172,19 @@ def _publish(voxels: Voxels, count: int, flipped: Int32, first_seen: Int32) -> t
     return flips, firsts
 
 
+def ball(field: DistanceField, centre_m: Float, radius_m: float) -> Int:
+    """Flat indices (N,) of the voxels with their centres in a ball; no other ones are looked at."""
+    shape = np.array(field.state.shape)
+    low, high = (
+        np.clip(np.floor((centre_m + sign * radius_m - field.origin_m) / field.voxel_size_m), 0, shape - 1)
+        for sign in (-1.0, 1.0)
+    )
+    index = np.stack(np.meshgrid(*map(np.arange, low, high + 1), indexing="ij"), axis=-1).reshape(-1, 3)
+    voxel = np.asarray(np.ravel_multi_index(tuple(index.astype(np.int64).T), field.state.shape))
+    near = np.linalg.norm(field.voxel_centres_m(voxel) - centre_m, axis=1) <= radius_m
+    return np.asarray(voxel[near], dtype=np.int64)
+
+
 def grid_shape(
     bounds_m: Float, voxel_size_m: float, max_memory_mb: float, bytes_per_voxel: int = _BYTES_PER_VOXEL
 ) -> tuple[int, int, int]:
@@ -231,6 +244,7 @@ class OccupancyMap:
             state=blank(size, np.uint8),
             changes=np.empty(size, np.int32),
         )
+        self._noted = np.zeros(0, np.int64)  # voxels that are occupied whatever is measured
         self.changed = 0  # how many of the voxels' `changes` are in use
         self._fade_s, self._fades = fade_s, 0  # and how often they have
         self._flipped: Int32 = np.empty(size, np.int32)
@@ -252,6 +266,11 @@ class OccupancyMap:
         centre = (np.asarray(centre_m, dtype=np.float64) - self.origin_m) / self.voxel_size_m
         self.changed = _mark_ball(self.voxels, centre, radius_m / self.voxel_size_m, self.changed)
 
+    def note_obstacle(self, centre_m: Float, radius_m: float) -> None:
+        """Make a ball occupied, for good."""
+        noted = ball(self.field, centre_m, radius_m)
+        self._noted = np.unique(np.concatenate([self._noted, noted]))
+
     def ray_arrays(self) -> tuple[Float32, Int32]:
         """Scratch of `rays`, made at first use: observations (N,), all inf, and a list of voxels (N,)."""
         if self._rays is None:
@@ -272,6 +291,9 @@ class OccupancyMap:
 
     def publish(self, time_s: float) -> MapUpdate:
         """Bring state and field up to what was integrated; return what changed since last time."""
+        for at in self._noted.tolist():
+            byte = (LARGEST_EVIDENCE << _EVIDENCE) | OCCUPIED | (int(self.voxels.live[at]) & _LISTED)
+            self.changed = enlist(self.voxels, at, byte, self.changed)
         flips, firsts = _publish(self.voxels, self.changed, self._flipped, self._first_seen)
         self.changed = 0
         state = self.voxels.state.reshape(self.shape)

@@ -220,6 +220,10 @@ class VoxelBlockGrid(MapParameters):
         """Declare a ball known free as far as it is unknown; measured surfaces override it."""
         self._live().mark_free(centre_m, radius_m)
 
+    def note_obstacle(self, centre_m: Float, radius_m: float) -> None:
+        """Declare a ball an obstacle that was felt, not seen; no measurement overrides it."""
+        self._live().note_obstacle(centre_m, radius_m)
+
     def integrate(self, scan: Scan) -> None:
         """Fuse one scan."""
         grid = self._live()

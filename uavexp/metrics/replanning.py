@@ -51,6 +51,15 @@ def count_by_cause(replans: Sequence[Replan]) -> dict[str, int]:
     return {name: counted[name] for name in (*COUNTED, *(set(counted) - set(COUNTED)))}
 
 
+def recoveries(log: TrialLog) -> dict[str, int]:
+    """How often each rung of the pilot's ladder was taken (`uavexp.pilot.recovery`), whatever came of it.
+
+    The requests of one moment are one: a rung tries several goals.
+    """
+    taken = Counter(cause for cause, _ in {(replan.cause, replan.time_s) for replan in log.replans})
+    return {cause.name: taken[cause.name] for cause in causes.RECOVERY}
+
+
 def count_useful(replans: Sequence[Replan], useful_change_m: float) -> int:
     """Replans whose path departs from the old one by more than this, m; the others were wasted."""
     return sum(replan.path_change_m > useful_change_m for replan in replans)
@@ -192,9 +201,19 @@ def own_causes(log: TrialLog) -> dict[str, int]:
     return {cause_metric(cause).column: count for cause, count in counts.items() if cause not in COUNTED}
 
 
+def _recoveries_of(cause: str) -> Measure:
+    return lambda flight: recoveries(flight.log)[cause]
+
+
 METRICS: Metrics = {
     Metric(column="replans", title="Replans, RF", digits=1, better=-1, is_count=True): _of_replans(len),
     **{cause_metric(cause): _count_of(cause) for cause in COUNTED},
+    **{
+        Metric(
+            column=f"recoveries_{cause.name}", title=f"Times that {cause.label}", better=-1, is_count=True
+        ): _recoveries_of(cause.name)
+        for cause in causes.RECOVERY
+    },
     Metric(column="useful_replans", title="Useful replans", digits=1, better=1, is_count=True): (
         lambda flight: count_useful(executed(flight.log), flight.useful_change_m)
     ),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import field
+from typing import ClassVar
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from uavexp.types import Limits, Observation, Outcome, World
 class Explore:
     """Explored = the explorer has had no goal for `patience_s`."""
 
+    nothing_left: ClassVar[Outcome] = Outcome.EXPLORED
     patience_s: Positive = 2.0  # s, explored when no frontier was reachable for so long [ours]
     time_base_s: Positive = 120.0  # s, time limit = this ... [ours]
     time_per_area_spm2: NonNegative = 1.0  # s/m², ... plus this for each square metre of floor [ours]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import field
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from uavexp.types import Limits, Observation, Outcome, World
 class Goto:
     """Reached = within `tolerance_m` of the target, in truth or as the vehicle believes."""
 
+    nothing_left: ClassVar[Outcome] = Outcome.UNREACHABLE
     tolerance_m: Positive = 0.3  # m, the target counts as reached within this distance [ours]
     arrival: Literal["truth", "belief"] = "truth"  # of the vehicle's true or estimated position: a
     # vehicle that drifts knows only the latter

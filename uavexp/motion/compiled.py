@@ -16,7 +16,7 @@ from uavexp.estimator.perfect import truth
 from uavexp.motion.base import Craft, Ending, Judge
 from uavexp.motion.kernel import fly_free
 from uavexp.pilot.following import row_of
-from uavexp.pilot.holding import HoldingPilot
+from uavexp.pilot.holding_pilot import HoldingPilot
 from uavexp.recorder import times_s
 from uavexp.types import Reference, State
 from uavexp.vehicle.quadrotor import Quadrotor, state_of

@@ -5,6 +5,7 @@ The package lies above the other roles: a pilot asks four of them.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -16,7 +17,11 @@ from uavexp.recorder import Stopwatch
 from uavexp.safety.base import Guard
 from uavexp.trajectory import Trajectory
 from uavexp.trigger.base import TriggerPolicy
-from uavexp.types import Goal, Limits, Observation, PlanResult, Reference
+from uavexp.types import Goal, Limits, Observation, Outcome, PlanResult, Reference
+
+
+def _not_noted(centre_m: Float, radius_m: float) -> None:
+    """Where there is no map to note it in."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,6 +38,7 @@ class Crew:
     start_yaw_rad: float
     flight_bounds_m: Float  # (2, 3)
     watch: Stopwatch
+    note_obstacle: Callable[[Float, float], None] = _not_noted  # a ball (3,) and radius that was felt
 
 
 class Pilot(Protocol):
@@ -58,6 +64,14 @@ class Piloting(Protocol):
     dropped_triggers: int
     first_plan: PlanResult | None  # the first that was found
     failure: str  # reason of the last failed request, "" after a success
+
+    @property
+    def recovers(self) -> bool:
+        """Whether it is lost and still tries something: nothing is over yet."""
+
+    @property
+    def given_up(self) -> Outcome | None:
+        """How the flight ends because nothing is left to be tried; None: it goes on."""
 
     @property
     def ever_planned(self) -> bool:

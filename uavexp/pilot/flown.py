@@ -11,8 +11,10 @@ from uavexp.arrays import Float
 from uavexp.braking import braking_trajectory
 from uavexp.pace import AS_PLANNED, Pace, delayed, evaluate_paced
 from uavexp.safety.base import Guard
-from uavexp.trajectory import Trajectory
-from uavexp.types import Goal, Limits, Observation
+from uavexp.trajectory import Trajectory, evaluate
+from uavexp.types import Goal, Limits, Observation, Squeeze
+
+_BEGUN_M = 0.1  # a plan that comes so far moves
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,6 +25,8 @@ class Flown:
     goal: Goal | None = None  # at its end; None: it is a stop
     moves_s: float = -math.inf  # before, it only turns
     pace: Pace = AS_PLANNED
+    squeeze: Squeeze | None = None  # through which it leads
+    backs: bool = False  # it leads back along the way flown, and is no stop though it has no goal
     waits_since_s: float = math.inf  # since when it has been stood still on before its end; inf: it moves
 
     @property
@@ -59,7 +63,24 @@ class Flown:
         late_s = now_s - own_s if own_s < now_s else 0.0
         trajectory = delayed(self.trajectory, late_s) if late_s else self.trajectory
         moves_s = self.moves_s + late_s
-        pace = guard.flyable(trajectory, now_s, (rate[0], rate[1]), observation, stops=stops).pace
+        pace = guard.flyable(
+            trajectory, now_s, (rate[0], rate[1]), observation, stops=stops, squeeze=self.squeeze
+        ).pace
         waits = pace.rests_s <= now_s < trajectory.end_s and now_s >= moves_s
         since_s = min(self.waits_since_s, now_s) if waits else math.inf
         return replace(self, trajectory=trajectory, moves_s=moves_s, pace=pace, waits_since_s=since_s)
+
+
+def stopped_off(observation: Observation, limits: Limits) -> Flown:
+    """A stop of a vehicle that is off its reference, from where it is, straight ahead."""
+    state = observation.state
+    start = (observation.time_s, state.position_m, state.velocity_mps, np.zeros(3))
+    return Flown(trajectory=braking_trajectory(*start, limits))
+
+
+def is_held(plan: Trajectory, pace: Pace) -> bool:
+    """Whether a plan at this pace rests where it begins."""
+    if not math.isfinite(pace.rests_s):
+        return False
+    ends_m = evaluate(plan, np.array([plan.start_s, float(pace.own_s[-1])]))[0]
+    return float(np.linalg.norm(ends_m[1] - ends_m[0])) < _BEGUN_M

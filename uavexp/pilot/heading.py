@@ -1,16 +1,19 @@
-"""Where the vehicle looks: the yaw that is asked for, turned step by step."""
+"""Where the vehicle looks: the yaw that is asked for, how fast to turn, and whether there is room to."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numba as nb
+import numpy as np
 
 from uavexp.arrays import Float
+from uavexp.field import DistanceField
 from uavexp.geometry import wrap_angle
+from uavexp.types import Limits
 
 _AHEAD_M = 0.1  # a shorter way ahead has no direction
+_CORNER_M = 0.02  # kept between the turning body and what is mapped
 _GAIN_PER_S = 4.0  # from yaw error to yaw rate
 
 
@@ -31,19 +34,10 @@ def rate_to(bearing_rad: float, yaw_rad: float, most_radps: float) -> float:
     return float(min(max(rate_radps, -most_radps), most_radps))
 
 
-@dataclass(slots=True, kw_only=True)
-class Heading:
-    """A yaw and how fast it may turn."""
-
-    yaw_rad: float
-    most_radps: float
-
-    def turn(self, rate_radps: float, step_s: float) -> float:
-        """Turn at this rate for one step; returns the rate."""
-        self.yaw_rad = wrap_angle(self.yaw_rad + rate_radps * step_s)
-        return rate_radps
-
-    def turning_s(self, bearing_rad: float, within_rad: float) -> float:
-        """Time to turn until the yaw is within an angle of a bearing, s."""
-        error_rad = abs(float(wrap_angle(bearing_rad - self.yaw_rad)))
-        return max(0.0, error_rad - within_rad) / self.most_radps
+def room_to_turn(field: DistanceField, position_m: Float, limits: Limits) -> bool:
+    """Whether the body can turn on the spot: the circle of its corners keeps off what is mapped."""
+    angle = np.linspace(0.0, 2.0 * math.pi, 16, endpoint=False)
+    circle = limits.body_radius_m * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(16)])
+    half_m = np.array([0.0, 0.0, 0.5 * limits.body_size_m[2]])
+    rings_m = np.concatenate([position_m + circle + share * half_m for share in (-1.0, 0.0, 1.0)])
+    return bool(field.distance_m(rings_m).min() >= _CORNER_M)

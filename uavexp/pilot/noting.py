@@ -10,9 +10,10 @@ from uavexp.arrays import Float
 from uavexp.log import Replan
 from uavexp.map_change import changed_near
 from uavexp.trajectory import Trajectory, evaluate, sample_times
-from uavexp.types import Decision, Goal, Observation, PlanResult
+from uavexp.types import Decision, Goal, Observation, PlanResult, PlanStatus
 
 _NEAR_M, _CHANGED_M = 2.0, 0.15  # r_mon and delta_map of paper 1
+NO_GOAL = PlanResult(status=PlanStatus.NO_PATH, reason="no goal is reachable")
 _SAMPLE_S = 0.1  # spacing of the samples kept of a trajectory
 
 
@@ -43,6 +44,22 @@ def replan_of(
         changed_m=observation.field.voxel_centres_m(decision.voxel).astype(np.float32),
         trajectory_m=new_m.astype(np.float32),
     )
+
+
+def here(observation: Observation) -> Goal:
+    """The place of the vehicle, for requests that have no goal."""
+    return Goal(position_m=observation.state.position_m, is_target=False, score=-math.inf)
+
+
+def target_of(observation: Observation) -> Goal | None:
+    """The mission's target, whatever the explorer says of it; None without one."""
+    target_m = observation.target_m
+    return None if target_m is None else Goal(position_m=target_m, is_target=True, score=-math.inf)
+
+
+def error_of(observation: Observation) -> float:
+    """Tracking error, m."""
+    return float(np.linalg.norm(observation.reference.position_m - observation.state.position_m))
 
 
 def _near_change(observation: Observation) -> bool:

@@ -94,7 +94,13 @@ class FindAndShape:
             raise RuntimeError("plan() needs reset() first")
         result = self._plan(request, self._constraints)
         narrow = self._constraints.narrowed(result, request, self.narrow_clearance_m, self.narrow_speed_mps)
-        return result if narrow is None else summed(result, self._plan(request, narrow), "a narrow place")
+        if narrow is not None:
+            result = summed(result, self._plan(request, narrow), "a narrow place")
+        squeeze = request.squeeze
+        if squeeze is None:
+            return result
+        least = self._constraints.narrowed(result, request, squeeze.clearance_m, squeeze.speed_mps)
+        return result if least is None else summed(result, self._plan(request, least), "a squeeze")
 
     def _plan(self, request: PlanRequest, constraints: Constraints) -> PlanResult:
         """`plan` within these constraints."""

@@ -7,7 +7,7 @@ from typing import Protocol
 
 from uavexp.pace import AS_PLANNED, Pace
 from uavexp.trajectory import Trajectory
-from uavexp.types import Limits, Observation
+from uavexp.types import Limits, Observation, Squeeze
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +39,7 @@ class Guard(Protocol):
         observation: Observation,
         *,
         stops: bool = False,
+        squeeze: Squeeze | None = None,
     ) -> Flyable:
         """At which pace to fly a plan from a time on.
 
@@ -48,6 +49,7 @@ class Guard(Protocol):
             rate: at which its own time runs then, and how that changes, 1/s.
             observation: the map, and the vehicle on its reference.
             stops: come to rest along it as soon as is comfortable: there is no plan beyond.
+            squeeze: through which it was planned: a lesser clearance than usual is kept, more slowly.
         """
 
 
@@ -67,6 +69,7 @@ class Unguarded:
         observation: Observation,
         *,
         stops: bool = False,
+        squeeze: Squeeze | None = None,
     ) -> Flyable:
         """Return: as planned."""
         return Flyable()

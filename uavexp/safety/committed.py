@@ -60,7 +60,7 @@ from uavexp.safety.base import Flyable, Guard
 from uavexp.safety.looked_at import look_at
 from uavexp.safety.speed_profile import Effort, Way, fastest_rates
 from uavexp.trajectory import Trajectory, evaluate
-from uavexp.types import Limits, Observation
+from uavexp.types import Limits, Observation, Squeeze
 
 _SAMPLE_S = 0.02  # at 2.5 m/s half a voxel apart
 _MOST_SAMPLES = 400
@@ -124,12 +124,13 @@ class _Commitment:
         observation: Observation,
         *,
         stops: bool = False,
+        squeeze: Squeeze | None = None,
     ) -> Flyable:
         """The fastest pace that rests within what is verified (`Guard.flyable`)."""
         if start_s >= plan.end_s:
             return Flyable()
         ahead = self._ahead(plan, start_s)
-        verified, bound_mps = self._verified(ahead, observation)
+        verified, bound_mps = self._verified(ahead, observation, squeeze)
         rest = len(verified)
         if not (ahead.ends and verified.all()):
             end = len(verified) - 1 if verified.all() else int(np.argmin(verified)) - 1
@@ -176,7 +177,9 @@ class _Commitment:
         ends = far >= len(own_s) and own_s[-1] == plan.end_s
         return _Ahead(own_s[:far], way, point_m[:far], along_m[:far], ends)
 
-    def _verified(self, ahead: _Ahead, observation: Observation) -> tuple[Bool, Float]:
+    def _verified(
+        self, ahead: _Ahead, observation: Observation, squeeze: Squeeze | None
+    ) -> tuple[Bool, Float]:
         """Whether each place ahead is verified, or left, and the speed (N,) that it bounds."""
         rules, field, radius_m = self.rules, observation.field, self.limits.body_radius_m
         half_height_m = 0.5 * self.limits.body_size_m[2]
@@ -190,12 +193,15 @@ class _Commitment:
             half_height_m,
         )
         wide_m = radius_m + rules.margin_m
-        near = clearance_m < min(rules.narrow_clearance_m, wide_m)
+        narrow_m, narrow_mps = rules.narrow_clearance_m, rules.narrow_speed_mps
+        if squeeze is not None and squeeze.clearance_m < narrow_m:
+            narrow_m, narrow_mps = squeeze.clearance_m, min(squeeze.speed_mps, narrow_mps)
+        near = clearance_m < min(narrow_m, wide_m)
         leaves = _leading(near) & (clearance_m >= clearance_m[0] - _NOISE_M)
         creeps = _leading(~seen) & centre & (ahead.along_m <= 2.0 * radius_m)
         verified = (~near | leaves) & (seen | creeps)
         verified[ahead.along_m <= _HERE_M] = True
-        bound_mps = np.where(clearance_m < wide_m, rules.narrow_speed_mps, np.inf)
+        bound_mps = np.where(clearance_m < wide_m, narrow_mps, np.inf)
         bound_mps[creeps] = np.minimum(bound_mps[creeps], rules.creep_mps)
         return verified, bound_mps
 

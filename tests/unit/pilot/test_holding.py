@@ -13,7 +13,8 @@ from uavexp.check.fields import box, empty, field_from
 from uavexp.explorer.target_only import TargetOnly
 from uavexp.field import DistanceField
 from uavexp.pilot.base import Crew
-from uavexp.pilot.holding import Holding, HoldingPilot
+from uavexp.pilot.holding import Holding
+from uavexp.pilot.holding_pilot import HoldingPilot
 from uavexp.planner.min_acc import MinAcc
 from uavexp.recorder import Stopwatch
 from uavexp.safety.brake import Brake
@@ -170,7 +171,7 @@ def test_a_moving_end_is_followed_by_a_stop() -> None:
 def test_from_standstill_it_looks_before_it_flies(yaw_rad: float) -> None:
     """It used to leave sideways into space the camera had never seen."""
     pilot = make(Ssp())
-    pilot.heading.yaw_rad = yaw_rad
+    pilot.steering.yaw_rad = yaw_rad
     moving_m = []
     for step in range(600):
         time_s = step * 0.01

@@ -14,7 +14,8 @@ from uavexp.explorer.target_only import TargetOnly
 from uavexp.field import DistanceField
 from uavexp.pace import Pace, evaluate_paced
 from uavexp.pilot.base import Crew
-from uavexp.pilot.holding import Holding, HoldingPilot
+from uavexp.pilot.holding import Holding
+from uavexp.pilot.holding_pilot import HoldingPilot
 from uavexp.planner.min_acc import MinAcc
 from uavexp.recorder import Stopwatch
 from uavexp.safety.base import Flyable

@@ -1,0 +1,336 @@
+"""Flies plans as they come, and without one brakes, holds, looks around and tries again.
+
+A request made at t is planned from the predicted reference at t + latency on the map at t
+and takes effect at t + latency; until then the vehicle follows the old trajectory. One
+request is in flight at a time, further triggers meanwhile are dropped and counted. When
+no plan is found: the goal is set aside, the next goals are tried, then the vehicle brakes
+within its stopping distance, holds, and tries again at the explorer's rate. A vehicle that
+has fallen behind its reference, whatever held it, stops where it is, and a plan is asked for.
+What the safety lets be flown of a plan is asked at every ESDF update (`safety.base.Guard`): a
+plan that it refuses has failed, one that it has held for `held_s` is made anew, the second
+time at one place to another goal. A vehicle that gets no further so climbs a ladder (`recovery`).
+What it stands against though nothing is mapped there is noted in the map (`touch`).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from uavexp import causes
+from uavexp.arrays import Float
+from uavexp.braking import with_stop
+from uavexp.log import Replan
+from uavexp.pace import AS_PLANNED
+from uavexp.pilot.base import Crew
+from uavexp.pilot.flown import Flown, is_held, stopped_off
+from uavexp.pilot.following import reference_of, row_of
+from uavexp.pilot.heading import room_to_turn
+from uavexp.pilot.noting import NO_GOAL, error_of, here, replan_of, target_of
+from uavexp.pilot.recovering import Recovering, ending, tried
+from uavexp.pilot.recovery import Rung
+from uavexp.pilot.rules import Rules
+from uavexp.pilot.steering import Steering
+from uavexp.pilot.touch import BALL_M, touched_m
+from uavexp.trajectory import Trajectory, evaluate, hover_before, sample_times
+from uavexp.types import (
+    Decision,
+    Goal,
+    Observation,
+    Outcome,
+    PlanRequest,
+    PlanResult,
+    PlanStatus,
+    Reference,
+    Squeeze,
+)
+
+_GOALS_FAULT = (PlanStatus.GOAL_BLOCKED, PlanStatus.NO_PATH, PlanStatus.NOT_CLEAR)  # another may do
+_ANYWAY = (*_GOALS_FAULT, PlanStatus.LIMITS, PlanStatus.SOLVER)  # the same for a vehicle that is lost
+_WARY_S = 5.0  # after a touch
+_AHEAD_S = 0.1
+_SAME_PLACE_M = 0.5
+
+
+@dataclass(slots=True, kw_only=True)
+class HoldingPilot:
+    """What is flown, and every planning request made on the way."""
+
+    rules: Rules
+    crew: Crew
+    steering: Steering
+    recovery: Recovering
+    flown: Flown | None = None
+    best_goal: Goal | None = None
+    replans: list[Replan] = field(default_factory=list)
+    dropped_triggers: int = 0
+    first_plan: PlanResult | None = None
+    failure: str = ""
+    _pending: Flown | None = None  # a plan waiting for its latency to pass
+    _wait_for_rest: bool = False  # after the safety's brake: no new plan before standstill
+    _touched_s: float = -math.inf  # when something was touched last
+    _held_m: Float | None = None  # (3,) where the safety held the vehicle last
+
+    @property
+    def trajectory(self) -> Trajectory | None:
+        """Being flown; None before the first plan."""
+        return None if self.flown is None else self.flown.trajectory
+
+    @property
+    def goal(self) -> Goal | None:
+        """Of that trajectory."""
+        return None if self.flown is None else self.flown.goal
+
+    @property
+    def recovers(self) -> bool:
+        """Whether it is lost and still tries something."""
+        return self.recovery.lasts
+
+    @property
+    def given_up(self) -> Outcome | None:
+        """How the flight ends when nothing is left to be tried."""
+        if not self.recovery.ladder.ended:
+            return None
+        return ending(self.replans, has_goal=self.best_goal is not None)
+
+    @property
+    def ever_planned(self) -> bool:
+        """Whether any plan was found."""
+        return any(replan.status is PlanStatus.OK for replan in self.replans)
+
+    def reference(self, time_s: float, step_s: float) -> Reference:
+        """What to follow now; adopts a plan whose time has come and turns the yaw."""
+        if self._pending is not None and time_s >= self._pending.trajectory.start_s - 1e-9:
+            self.flown, self._pending = self._pending, None
+        if self.failure and not self._moving(time_s):
+            return self.steering.look_around(self._planned_state(math.inf)[0], step_s)
+        if self.flown is None:
+            return self.steering.hold(self.crew.start_m)
+        times_s = np.array([time_s])
+        return reference_of(self.steering.follow(self.flown, self._wanted_rad, times_s, step_s)[0])
+
+    def references(self, times_s: Float, step_s: float) -> Float:
+        """`reference` of one step to come after the other, as rows (N, 14) of `following`."""
+        pending = self._pending
+        adopts = pending is not None and times_s[-1] >= pending.trajectory.start_s - 1e-9
+        if self.flown is None or self.failure or adopts:
+            return np.array([row_of(self.reference(time_s, step_s)) for time_s in times_s.tolist()])
+        return self.steering.follow(self.flown, self._wanted_rad, times_s, step_s)
+
+    def explore(self, observation: Observation) -> None:
+        """Update g*; while without a valid plan, try again."""
+        self._select(observation, fresh=False)
+        if observation.time_s < self.rules.settle_s - 1e-9:
+            return
+        self._miss_goals(observation)
+        rung = self._climbed(observation)
+        if rung is not None:
+            self._recover(rung, observation)
+        elif self.flown is None and not self.replans:
+            self.request(Decision(replan=True, cause=causes.FIRST.name), observation)
+        elif self.failure and not (self._wait_for_rest and self._moving(observation.time_s)):
+            braked = self._wait_for_rest and not self.recovery.lost
+            cause = (causes.BRAKE if braked else causes.RETRY).name
+            self.request(Decision(replan=True, cause=cause), observation)
+        elif self._waits_s(observation.time_s) >= self.rules.held_s:
+            self._ask_anew(observation)
+
+    def decide(self, observation: Observation) -> float:
+        """Ask safety and trigger; return the trigger's score."""
+        self.recovery.look(observation)
+        behind = self._stops_behind(observation)
+        wary = self.recovery.ladder.climbing or observation.time_s < self._touched_s + _WARY_S
+        here_m = observation.state.position_m
+        self.steering.turns = not wary or room_to_turn(observation.field, here_m, self.crew.limits)
+        if not self.failure and self.crew.guard.must_brake(observation):
+            self._brake(observation, "braked before an obstacle or unknown space")
+            self._wait_for_rest = True
+        if self.flown is not None and self._pending is None:  # a plan in flight begins on the present pace
+            with self.crew.watch.lap("safety"):
+                stops = bool(self.failure) and not self.flown.backs
+                self.flown = self.flown.repaced(observation, self.crew.guard, stops=stops)
+        with self.crew.watch.lap("trigger"):
+            decision = self.crew.trigger.decide(observation)
+        # After a failure the pilot tries again by itself, equally often under every policy.
+        if behind is not None:
+            self.request(Decision(replan=True, cause=behind.name), observation)
+        elif decision.replan and self.flown is not None and not self.failure:
+            self.request(decision, observation)
+        return decision.score
+
+    def request(self, decision: Decision, observation: Observation, squeeze: Squeeze | None = None) -> None:
+        """Plan to the best goal, else to the next best; brake when there is no plan."""
+        if self._pending is not None:
+            self.dropped_triggers += 1
+            return
+        goal = self._select(observation, fresh=True)
+        if squeeze is not None:
+            goal = goal or target_of(observation)
+        if goal is None and self.recovery.lost:
+            self.replans.append(replan_of(decision, observation, here(observation), NO_GOAL, None))
+        for _ in range(self.rules.goals_per_request):
+            if goal is None:
+                break
+            result, flown = self._plan(observation, goal, squeeze)
+            self.replans.append(replan_of(decision, observation, goal, result, self.trajectory))
+            if flown is not None:
+                self.first_plan = self.first_plan or result
+                self._accept(flown, observation)
+                return
+            self.failure = f"{result.status.value}: {result.reason}"
+            if result.status not in (_ANYWAY if self.recovery.lost else _GOALS_FAULT):
+                break
+            self.recovery.refused_s = observation.time_s
+            self.crew.explorer.reject(goal.position_m, observation.time_s)
+            goal = self._select(observation, fresh=True)
+        if goal is None:
+            self.failure = self.failure or "no goal is reachable"
+        self._brake(observation, self.failure)
+
+    def _select(self, observation: Observation, *, fresh: bool) -> Goal | None:
+        with self.crew.watch.lap("explore"):
+            self.best_goal = self.crew.explorer.select(observation, fresh=fresh)
+        return self.best_goal
+
+    def _plan(
+        self, observation: Observation, goal: Goal, squeeze: Squeeze | None
+    ) -> tuple[PlanResult, Flown | None]:
+        """The planner's answer, and what is to be flown of it: nothing where the safety refuses."""
+        result = self.crew.planner.plan(self._plan_request(observation, goal, squeeze))
+        self.crew.watch.add("search", result.wall_search_s)
+        self.crew.watch.add("optimise", result.wall_optimise_s)
+        plan = result.trajectory
+        if plan is None:
+            return result, None
+        turn_s = self.steering.first_s(plan, self._wanted_rad)
+        flown = with_stop(hover_before(plan, turn_s), self.crew.limits)
+        rate = AS_PLANNED.at(plan.start_s)[1:]
+        way = self.crew.guard.flyable(flown, plan.start_s, rate, observation, squeeze=squeeze)
+        refused = way.refused
+        if not refused and self.recovery.lost and is_held(flown, way.pace):
+            self.recovery.note_hold(evaluate(flown, sample_times(flown, flown.start_s, _AHEAD_S))[0])
+            refused = "the safety holds it where it stands"
+        if refused:
+            return replace(result, status=PlanStatus.LIMITS, trajectory=None, reason=refused), None
+        moves_s = plan.start_s + turn_s
+        return result, Flown(trajectory=flown, goal=goal, moves_s=moves_s, pace=way.pace, squeeze=squeeze)
+
+    def _plan_request(self, observation: Observation, goal: Goal, squeeze: Squeeze | None) -> PlanRequest:
+        """From the reference at t + latency; from the measured state if that is far off or in an obstacle."""
+        start_s = observation.time_s + self.crew.latency_s
+        state = observation.state
+        position_m, velocity_mps, acceleration_mps2 = self._planned_state(start_s)
+        far = error_of(observation) >= self.rules.restart_error_m or self._waits_s(start_s) > 0.0
+        if far or observation.field.distance_m(position_m[None])[0] <= 0.0:
+            position_m = state.position_m + self.crew.latency_s * state.velocity_mps
+            velocity_mps, acceleration_mps2 = state.velocity_mps, np.zeros(3)
+        return PlanRequest(
+            time_s=start_s, position_m=position_m, velocity_mps=velocity_mps,
+            acceleration_mps2=acceleration_mps2, goal=goal, field=observation.field,
+            flight_bounds_m=self.crew.flight_bounds_m, tracks=observation.tracks, squeeze=squeeze,
+        )  # fmt: skip
+
+    @property
+    def _wanted_rad(self) -> float:
+        """The yaw that g* asks for; NaN: none."""
+        return math.nan if self.best_goal is None else self.best_goal.yaw_rad
+
+    def _planned_state(self, time_s: float) -> tuple[Float, Float, Float]:
+        if self.flown is None:
+            return self.crew.start_m, np.zeros(3), np.zeros(3)
+        return self.flown.state(time_s)
+
+    def _accept(self, flown: Flown, observation: Observation) -> None:
+        self._pending = flown
+        self.failure, self._wait_for_rest = "", False
+        self.crew.trigger.planned(flown.trajectory, observation.field)
+
+    def _moving(self, time_s: float) -> bool:
+        return self.flown is not None and time_s < self.flown.ends_s
+
+    def _waits_s(self, time_s: float) -> float:
+        """How long the safety has held the vehicle on a plan, s; not positive: it does not."""
+        held = self.flown is not None and self._pending is None and not self.failure
+        return time_s - self.flown.waits_since_s if held and self.flown is not None else -math.inf
+
+    def _ask_anew(self, observation: Observation) -> None:
+        """Plan from where the safety holds the vehicle: to another goal, if that has not helped before."""
+        here_m, before_m = observation.state.position_m.copy(), self._held_m
+        again = before_m is not None and float(np.linalg.norm(here_m - before_m)) < _SAME_PLACE_M
+        if self.flown is not None:
+            own_s, plan = self.flown.pace.at(observation.time_s)[0], self.flown.trajectory
+            self.recovery.note_hold(evaluate(plan, sample_times(plan, own_s, _AHEAD_S))[0])
+        if again and self.goal is not None:
+            self.recovery.refused_s = observation.time_s
+            self.crew.explorer.reject(self.goal.position_m, observation.time_s)
+        self._held_m = here_m
+        self.request(Decision(replan=True, cause=causes.HELD.name), observation)
+
+    def _miss_goals(self, observation: Observation) -> None:
+        """Without any goal, though not for want of frontiers, the vehicle is lost."""
+        stands = self.flown is not None and self._pending is None and not self._moving(observation.time_s)
+        if self.best_goal is not None or self.failure or not stands:
+            return
+        if self.recovery.misses_goals(observation):
+            self.failure = "no goal is reachable"
+
+    def _climbed(self, observation: Observation) -> Rung | None:
+        """The rung of the ladder whose turn it is; None: go on as before."""
+        time_s = observation.time_s
+        moving, waits_s = self._moving(time_s), self._waits_s(time_s)
+        held = waits_s > 0.0 if self.recovery.ladder.climbing else waits_s >= self.rules.held_s
+        lost = held or (bool(self.failure) and not moving)
+        return self.recovery.climb(observation, lost=lost, busy=moving or self._pending is not None)
+
+    def _recover(self, rung: Rung, observation: Observation) -> None:
+        """Do what a rung asks for."""
+        decision = Decision(replan=True, cause=rung.value)
+        if rung is Rung.END:
+            self.failure = f"{self.failure or 'the safety holds it'}; {tried(self.replans)}"
+            return
+        if not self.failure:
+            self._brake(observation, "the safety holds it")
+        if rung is Rung.BACK:
+            self._back_up(decision, observation)
+            return
+        if rung is Rung.NOTE and self.recovery.held_at_m is not None:
+            self.crew.note_obstacle(self.recovery.held_at_m, BALL_M)
+            self.recovery.held_at_m = None
+        for squeeze in self.recovery.squeezes() if rung is Rung.LESSER else (None,):
+            self.request(decision, observation, squeeze)
+            if not self.failure:
+                return
+
+    def _back_up(self, decision: Decision, observation: Observation) -> None:
+        """Fly back along the way that was flown."""
+        goal, result, flown = self.recovery.back(observation, self.crew.guard)
+        self.replans.append(replan_of(decision, observation, goal, result, self.trajectory))
+        if flown is not None:
+            self.flown, self._wait_for_rest = flown, True
+
+    def _brake(self, observation: Observation, reason: str) -> None:
+        """Leave any plan in flight and stop, along the way where the safety does; hold where that ends."""
+        self.failure, self._pending = reason, None
+        flown = self.flown
+        if flown is not None and flown.goal is not None and self._moving(observation.time_s):
+            self.flown = flown.stopped(observation, self.crew.guard, self.crew.limits)
+
+    def _stops_behind(self, observation: Observation) -> causes.Cause | None:
+        """Why the vehicle stops where it is from now on: it fell behind, or it touches; None: it does not."""
+        error_m, most_m = error_of(observation), self.rules.restart_error_m
+        touches, behind = self.recovery.touches(observation), 0.0 < most_m <= error_m
+        if self.flown is None or not (behind or touches):
+            return None
+        self.failure = f"the vehicle was {error_m:.2f} m from its reference"
+        self._pending, self.flown = None, stopped_off(observation, self.crew.limits)
+        if not touches:
+            return causes.BEHIND
+        self._touched_s = observation.time_s
+        obstacle_m = touched_m(observation, self.crew.limits)
+        if obstacle_m is None:
+            return causes.BEHIND
+        self.crew.note_obstacle(obstacle_m, BALL_M)
+        self.failure += ", and nothing is mapped in its way"
+        return causes.NOTED
