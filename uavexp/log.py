@@ -110,6 +110,7 @@ class TrackRows:
     identity: Int = field(default_factory=none(dtype=np.int64))  # (S,)
     position_m: Float = field(default_factory=none(0, 3))  # (S, 3)
     velocity_mps: Float = field(default_factory=none(0, 3))  # (S, 3)
+    swerve_m: Float32 = field(default_factory=none(0, 0, 3, dtype=np.float32))  # (S, K, 3) `Tracks.swerve_m`
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

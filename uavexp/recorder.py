@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from uavexp.arrays import Float, Int32
+from uavexp.arrays import Float, Float32, Int32
 from uavexp.bodies import distance_m
 from uavexp.field import OCCUPIED, DistanceField
 from uavexp.log import (
@@ -233,7 +233,17 @@ def _track_rows(tracks: Sequence[Tracks]) -> TrackRows:
         identity=np.concatenate([now.identity for now in tracks]),
         position_m=np.concatenate([now.position_m for now in tracks]),
         velocity_mps=np.concatenate([now.velocity_mps for now in tracks]),
+        swerve_m=_swerves_m(tracks),
     )
+
+
+def _swerves_m(tracks: Sequence[Tracks]) -> Float32:
+    """Swerves (S, K, 3), as far as any is predicted; empty without."""
+    steps = max(now.swerve_m.shape[1] for now in tracks)
+    if steps == 0:
+        return TrackRows().swerve_m
+    parts = [now.swerve_m if now.swerve_m.size else np.zeros((len(now), steps, 3)) for now in tracks]
+    return np.concatenate(parts).astype(np.float32)
 
 
 def _first_plan(plan: PlanResult | None) -> FirstPlan:

@@ -19,6 +19,8 @@ from uavexp.field import DistanceField
 from uavexp.space import Space
 from uavexp.trajectory import Trajectory
 
+SWERVE_STEP_S = 0.2  # between two places of a predicted path
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class State:
@@ -112,7 +114,11 @@ class Bodies:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tracks:
-    """The moving obstacles as the vehicle believes them, with constant velocity ahead."""
+    """The moving obstacles as the vehicle believes them, and where they will be.
+
+    A mover goes on at constant velocity but for its swerve: by how much it will be elsewhere, at every
+    `SWERVE_STEP_S` from then on; between two of them, and beyond the last, in a straight line.
+    """
 
     time_s: float
     identity: Int  # (N,) stays with a track while it lives
@@ -121,9 +127,11 @@ class Tracks:
     covariance: Float  # (N, 6, 6) of position and velocity, SI
     half_size_m: Float  # (N, 3) of an upright box around the mover
     dropped: int = 0  # filters given up so far because they diverged
+    swerve_m: Float = field(default_factory=lambda: np.zeros((0, 0, 3)))  # (N, K, 3); K = 0: none
 
     def __post_init__(self) -> None:
         count = len(self.identity)
+        check_shape("swerve_m", self.swerve_m, (count if self.swerve_m.size else None, None, 3))
         for name in ("position_m", "velocity_mps", "half_size_m"):
             check_shape(name, getattr(self, name), (count, 3))
         check_shape("covariance", self.covariance, (count, 6, 6))
@@ -144,9 +152,21 @@ class Tracks:
         )
 
     def predicted_m(self, times_s: Float) -> Float:
-        """Centres (N, K, 3) at absolute times (K,), at constant velocity from `time_s`."""
+        """Centres (N, T, 3) at absolute times (T,)."""
         ahead_s = np.asarray(times_s, dtype=np.float64) - self.time_s
-        return self.position_m[:, None] + ahead_s[None, :, None] * self.velocity_mps[:, None]
+        straight_m = self.position_m[:, None] + ahead_s[None, :, None] * self.velocity_mps[:, None]
+        return straight_m + self.swerved_m(times_s) if self.swerve_m.size else straight_m
+
+    def swerved_m(self, times_s: Float) -> Float:
+        """By how much (N, T, 3) they will be elsewhere than at constant velocity, at absolute times (T,)."""
+        count, steps = len(self), self.swerve_m.shape[1]
+        if not self.swerve_m.size:
+            return np.zeros((count, 0, 3))
+        knots_m = np.concatenate([np.zeros((count, 1, 3)), self.swerve_m], axis=1)
+        at = np.maximum(np.asarray(times_s, dtype=np.float64) - self.time_s, 0.0) / SWERVE_STEP_S
+        before = np.minimum(at.astype(np.int64), steps - 1)
+        share = (at - before)[None, :, None]
+        return np.asarray((1.0 - share) * knots_m[:, before] + share * knots_m[:, before + 1])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -18,6 +18,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from uavexp.arrays import Float
+from uavexp.field import DistanceField
 from uavexp.parameters import FINITE, Positive, at_least
 
 
@@ -26,6 +27,7 @@ class Estimate(StrEnum):
 
     KALMAN = "kalman"
     RAW = "raw"  # the last two observed positions: the baseline
+    IMM = "imm"  # interacting multiple models (`interacting`), which predict a path as well
 
 
 _H = np.eye(3, 6)
@@ -54,8 +56,11 @@ class FilterParameters:
     # while the model holds [ours]
     adaptivity: Annotated[float, at_least(1), FINITE] = 20.0  # 1, q is raised at most so many times while
     # innovations are large (paper: during manoeuvres); 1: never
-    estimate: Estimate = Estimate.KALMAN  # kalman | raw: velocities from the last two observed places,
-    # the baseline [ours]
+    estimate: Estimate = (
+        Estimate.KALMAN
+    )  # kalman (paper) | raw: velocities from the last two observed places,
+    # the baseline | imm: interacting multiple models of steady, turning, accelerating and manoeuvring movers
+    # that rebound at mapped walls [ours]
 
 
 @lru_cache(maxsize=64)
@@ -130,8 +135,12 @@ class MotionFilter:
             return self.position_m, self.velocity_mps
         return self._seen_m + self._unseen_s * self._raw_mps, self._raw_mps
 
-    def predict(self, period_s: float) -> None:
-        """Move on by a period > 0 s."""
+    def swerve_m(self, half_size_m: Float, field: DistanceField | None) -> Float:
+        """None (0, 3): it goes on at constant velocity."""
+        return np.zeros((0, 3))
+
+    def predict(self, period_s: float, half_size_m: Float, field: DistanceField | None) -> None:
+        """Move on by a period > 0 s, whatever its size and the map."""
         self._unseen_s += period_s
         density = self.motion.acceleration_density * min(max(self.misfit, 1.0), self.motion.adaptivity)
         transition, noise = _step(round(period_s, 6))
@@ -155,15 +164,19 @@ class MotionFilter:
 
     def is_sound(self, max_speed_mps: float, max_deviation_m: float) -> bool:
         """Whether state and covariance are finite, and speed and position within these limits."""
-        state, covariance = self._kalman.x, self._kalman.P
-        if not (np.isfinite(state).all() and np.isfinite(covariance).all()):
-            return False
-        variance = np.diagonal(covariance)
-        return bool(
-            np.linalg.norm(state[3:]) <= max_speed_mps
-            and variance.min() >= 0.0
-            and variance[:3].max() <= max_deviation_m**2
-        )
+        return is_sound(self._kalman.x, self._kalman.P, max_speed_mps, max_deviation_m)
+
+
+def is_sound(state: Float, covariance: Float, max_speed_mps: float, max_deviation_m: float) -> bool:
+    """Whether a state (6,) and its covariance are finite, and speed and position within these limits."""
+    if not (np.isfinite(state).all() and np.isfinite(covariance).all()):
+        return False
+    variance = np.diagonal(covariance)
+    return bool(
+        np.linalg.norm(state[3:]) <= max_speed_mps
+        and variance.min() >= 0.0
+        and variance[:3].max() <= max_deviation_m**2
+    )
 
 
 def estimated(
@@ -184,7 +197,7 @@ def estimated(
     believed = np.full((2, len(times_s), 3), np.nan)
     for k, position_m in enumerate(positions_m):
         if filter_ is not None:
-            filter_.predict(float(times_s[k] - times_s[k - 1]))
+            filter_.predict(float(times_s[k] - times_s[k - 1]), np.zeros(3), None)
             filter_.observe(position_m)
         elif np.isfinite(position_m).all():
             filter_ = MotionFilter(position_m, motion or MotionModel())

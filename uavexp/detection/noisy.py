@@ -12,7 +12,8 @@ import numpy as np
 
 from uavexp.arrays import Int
 from uavexp.bodies import present
-from uavexp.detection.kalman import FilterParameters, MotionFilter, MotionModel
+from uavexp.detection.filters import MoverFilter, new_filter
+from uavexp.detection.kalman import FilterParameters, MotionModel
 from uavexp.detection.returns import without_bodies
 from uavexp.field import DistanceField
 from uavexp.parameters import NonNegative, option
@@ -27,7 +28,7 @@ class Noisy(FilterParameters):
     margin_m: NonNegative = 0.1  # m, returns so near to a mover are taken for its own:
     # three sigma of the sensors' noise [ours]
     _rng: np.random.Generator | None = field(init=False, repr=False, default=None)
-    _filters: dict[int, MotionFilter] = field(init=False, repr=False, default_factory=dict)
+    _filters: dict[int, MoverFilter] = field(init=False, repr=False, default_factory=dict)
     _time_s: float = field(init=False, repr=False, default=np.nan)
 
     def reset(self, limits: Limits, rng: np.random.Generator) -> None:
@@ -37,7 +38,7 @@ class Noisy(FilterParameters):
     def detect(self, scan: Scan, field: DistanceField, truth: Bodies) -> tuple[Scan, Tracks]:
         """Return the scan without the returns of bodies, and a track of each that is there."""
         there = np.flatnonzero(present(truth.position_m))
-        self._observe(scan.time_s, truth, there)
+        self._observe(scan.time_s, truth, there, field)
         filters = [self._filters[int(body)] for body in there]
         if not filters:
             return scan, Tracks.none(scan.time_s)
@@ -49,10 +50,11 @@ class Noisy(FilterParameters):
             velocity_mps=np.stack(velocity_mps),
             covariance=np.stack([one.covariance for one in filters]),
             half_size_m=truth.half_size_m[there],
+            swerve_m=np.stack([self._filters[int(b)].swerve_m(truth.half_size_m[b], field) for b in there]),
         )
         return without_bodies(scan, truth, self.margin_m), tracks
 
-    def _observe(self, time_s: float, truth: Bodies, there: Int) -> None:
+    def _observe(self, time_s: float, truth: Bodies, there: Int, field: DistanceField) -> None:
         """Filter the bodies that are there on; forget those that are not."""
         if self._rng is None:
             raise RuntimeError("reset() must come first")
@@ -68,9 +70,9 @@ class Noisy(FilterParameters):
             seen_m = truth.position_m[body] + noise_m[body]
             filter_ = known.get(body)
             if filter_ is None:
-                filter_ = MotionFilter(seen_m, motion)
+                filter_ = new_filter(seen_m, motion, self.estimate)
             elif time_s > self._time_s:
-                filter_.predict(time_s - self._time_s)
+                filter_.predict(time_s - self._time_s, truth.half_size_m[body], field)
                 filter_.observe(seen_m)
             self._filters[body] = filter_
         self._time_s = time_s

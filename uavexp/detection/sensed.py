@@ -96,7 +96,7 @@ class Sensed(FilterParameters):
         clusters = split(clusters, points_m, sensor_m, *self._tracker.predict(period_s, field))
         moving = self._tracker.observe(clusters, scan, period_s)
         taken = np.append(moving, False)[clusters.label]
-        return without(scan, seen.where[loose][taken]), self._tracker.published(scan.time_s)
+        return without(scan, seen.where[loose][taken]), self._tracker.published(scan.time_s, field)
 
     def _remember(self, now: DistanceField, time_s: float) -> None:
         """Keep the map of at least `memory_s` ago, from where there is one."""

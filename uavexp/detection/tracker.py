@@ -24,7 +24,8 @@ import numpy as np
 
 from uavexp.arrays import Bool, Float, Int
 from uavexp.detection.clusters import Clusters
-from uavexp.detection.kalman import Estimate, MotionFilter, MotionModel
+from uavexp.detection.filters import MoverFilter, new_filter
+from uavexp.detection.kalman import Estimate, MotionModel
 from uavexp.detection.returns import viewpoint_m
 from uavexp.detection.sight import seen_empty
 from uavexp.field import DistanceField
@@ -58,7 +59,7 @@ class Track:
     """One mover, as far as it is known."""
 
     identity: int
-    filter: MotionFilter
+    filter: MoverFilter
     half_size_m: Float  # (3,) largest seen
     place_m: Float  # (3,) where it was born or last stood
     hits: int = 1
@@ -76,7 +77,7 @@ class Track:
     def predict(self, period_s: float, field: DistanceField) -> None:
         """Move on by a period > 0 s; one that is not in sight stays where it meets an obstacle."""
         before_m = self.filter.position_m.copy()
-        self.filter.predict(period_s)
+        self.filter.predict(period_s, self.half_size_m, field)
         if self.unseen_s > 0.0:
             after_m = np.append(self.filter.position_m[:2], before_m[2])  # the floor is in nobody's way
             free_m = field.distance_m(np.stack([before_m, after_m]))
@@ -148,8 +149,8 @@ class Tracker:
         for track, empty in zip(known, seen_empty(scan, centre_m, half_m), strict=True):
             track.empty = track.empty + 1 if empty else 0
 
-    def published(self, time_s: float) -> Tracks:
-        """The movers that are believed to be there."""
+    def published(self, time_s: float, field: DistanceField) -> Tracks:
+        """The movers that are believed to be there, and where they go in this map."""
         known = [track for track in self.tracks if track.confirmed]
         if not known:
             return replace(Tracks.none(time_s), dropped=self.dropped)
@@ -163,6 +164,7 @@ class Tracker:
             velocity_mps=np.stack(velocity_mps),
             covariance=np.stack([track.filter.covariance for track in known]),
             half_size_m=np.stack([track.half_size_m for track in known]),
+            swerve_m=np.stack([track.filter.swerve_m(track.half_size_m, field) for track in known]),
             dropped=self.dropped,
         )
 
@@ -213,7 +215,7 @@ class Tracker:
         nothing = np.full((len(clusters), 3), np.nan)
         centre_m = centres_m(clusters, half_m, nothing, sensor_m)
         for k in new:
-            filter_ = MotionFilter(centre_m[k], self.rule.motion)
+            filter_ = new_filter(centre_m[k], self.rule.motion, self.rule.estimate)
             self.tracks.append(Track(self._born, filter_, half_m[k], centre_m[k]))
             self._born += 1
 

@@ -18,6 +18,7 @@ from uavexp.arrays import Float, Int
 from uavexp.bodies import present
 from uavexp.log import Contact, TrialLog
 from uavexp.metrics.metric import Flight, Measure, Metric, Metrics
+from uavexp.types import Tracks
 
 HORIZONS_S = (0.3, 0.6, 0.9, 1.2)
 MEAN_HORIZONS_S = tuple(0.1 * step for step in range(1, 13))  # the mean is taken over these
@@ -44,27 +45,22 @@ def nearest_m(log: TrialLog) -> float:
 
 
 def predicted_errors_m(
-    now_s: float,
-    position_m: Float,
-    velocity_mps: Float,
+    track: Tracks,
     times_s: Float,
     truth_m: Float,
     ahead_s: Sequence[float],
 ) -> Float:
-    """Distances (H,) of constant-velocity predictions from the truth; NaN after its last row and where it is.
+    """Distances (H,) of predictions from the truth; NaN after its last row and where it is.
 
     Args:
-        now_s: when the prediction is made.
-        position_m: (3,) believed.
-        velocity_mps: (3,) believed.
+        track: one, as believed when the prediction is made.
         times_s: (T,) increasing times of the truth.
         truth_m: (T, 3) true positions.
         ahead_s: horizons (H,).
     """
-    later_s = now_s + np.asarray(ahead_s)
+    later_s = track.time_s + np.asarray(ahead_s)
     true_m = np.stack([np.interp(later_s, times_s, truth_m[:, axis]) for axis in range(3)], axis=1)
-    predicted_m = position_m + np.asarray(ahead_s)[:, None] * velocity_mps
-    error_m: Float = np.linalg.norm(predicted_m - true_m, axis=1)
+    error_m: Float = np.linalg.norm(track.predicted_m(later_s)[0] - true_m, axis=1)
     return np.where(later_s <= times_s[-1] + 1e-9, error_m, np.nan)
 
 
@@ -127,8 +123,8 @@ def quality(log: TrialLog, *, gate_m: float = GATE_M, within_m: float = WITHIN_M
             apart.append(float(apart_m[mover, n]))
             ahead.append(
                 predicted_errors_m(
-                    now_s, log.tracks.position_m[mine][n], log.tracks.velocity_mps[mine][n], log.steps.time_s,
-                    truth_m[:, mover], (*HORIZONS_S, *MEAN_HORIZONS_S),
+                    _track(log, now_s, mine.start + n), log.steps.time_s, truth_m[:, mover],
+                    (*HORIZONS_S, *MEAN_HORIZONS_S),
                 )
             )  # fmt: skip
     errors_m = np.array(ahead).reshape(-1, len(HORIZONS_S) + len(MEAN_HORIZONS_S))
@@ -141,6 +137,20 @@ def quality(log: TrialLog, *, gate_m: float = GATE_M, within_m: float = WITHIN_M
         missed_share=missed / near if near else math.nan,
         false_share=(tracks - matched) / tracks if tracks else math.nan,
         identity_switches=switches,
+    )
+
+
+def _track(log: TrialLog, now_s: float, row: int) -> Tracks:
+    """One row of the logged tracks."""
+    rows = log.tracks
+    return Tracks(
+        time_s=now_s,
+        identity=rows.identity[row : row + 1],
+        position_m=rows.position_m[row : row + 1],
+        velocity_mps=rows.velocity_mps[row : row + 1],
+        covariance=np.zeros((1, 6, 6)),
+        half_size_m=np.zeros((1, 3)),
+        swerve_m=rows.swerve_m[row : row + 1].astype(np.float64),
     )
 
 

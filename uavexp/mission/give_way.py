@@ -1,9 +1,10 @@
 """Where no mover comes: which places are free for a while, and where to step aside.
 
-A mover is the upright box around it, carried along at constant velocity. Where that leads into an
+A mover is the upright box around it, carried along as predicted. Where that leads to an
 obstacle of the live map it will turn, and nobody knows where to: from then on it may be anywhere
-that its speed takes it. The vehicle gets to a place from rest to rest in a straight line.
-Nothing is asked of predictions beyond `HORIZON_S`. [ours: the paper's people only walk by]
+that its speed takes it from there, or from its predicted way. The vehicle gets to a place from rest to
+rest in a straight line. Nothing is asked of predictions beyond `HORIZON_S`. [ours: the
+paper's people only walk by]
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 
 from uavexp.arrays import Bool, Float
 from uavexp.field import DistanceField
-from uavexp.planner.movers.moving import box_gap, turns_s
+from uavexp.planner.movers.moving import box_gap, swerved_m, turns_s
 from uavexp.trajectory import Trajectory, evaluate
 from uavexp.types import Limits, Tracks
 
@@ -25,6 +26,7 @@ _FAR_WORTH = 0.05  # m of room that a metre of way must bring
 _ENOUGH_M = 0.3  # room beyond what must be kept is worth nothing
 _SAME_M = 0.25  # places so near to each other are one
 _HELD_WORTH_M = 0.15  # by which another place must be better, room on the way and there added up
+_COLUMNS = 11  # of a mover's row before its swerve
 _ALONG = 6  # samples of the way to a place, for its clearance
 
 
@@ -51,10 +53,12 @@ def room_along_m(tracks: Tracks, turn_s: Float, trajectory: Trajectory, time_s: 
 
 
 def _rows(tracks: Tracks, turn_s: Float) -> Float:
-    """Movers as rows (B, 11): centre, velocity, half size, speed, time of the turn."""
+    """Movers as rows (B, 11 + 3 K): centre, velocity, half size, speed, time of the turn, swerve."""
     speed_mps = np.linalg.norm(tracks.velocity_mps, axis=1)[:, None]
     parts = (tracks.position_m, tracks.velocity_mps, tracks.half_size_m, speed_mps, turn_s[:, None])
-    return np.concatenate(parts, axis=1)
+    if not tracks.swerve_m.size:
+        return np.concatenate(parts, axis=1)
+    return np.concatenate([*parts, tracks.swerve_m.reshape(len(tracks), -1)], axis=1)
 
 
 def aside_m(
@@ -103,12 +107,16 @@ def _gap_m(rows: Float, x: float, y: float, z: float, ahead_s: float) -> float:
     """Distance of a point to the nearest place at which a mover may be."""
     least = np.inf
     for row in rows:
-        on_s = min(ahead_s, row[10])
+        before_s = min(ahead_s, row[10])
+        on_s = ahead_s if row.shape[0] > _COLUMNS else before_s
+        aside = swerved_m(row, _COLUMNS, ahead_s)
         gap = box_gap(
             row[6], row[7], row[8],
-            x - row[0] - on_s * row[3], y - row[1] - on_s * row[4], z - row[2] - on_s * row[5],
+            x - row[0] - on_s * row[3] - aside[0],
+            y - row[1] - on_s * row[4] - aside[1],
+            z - row[2] - on_s * row[5] - aside[2],
         )  # fmt: skip
-        least = min(least, gap - _SPREAD_MPS * ahead_s - row[9] * (ahead_s - on_s))
+        least = min(least, gap - _SPREAD_MPS * ahead_s - row[9] * (ahead_s - before_s))
     return float(least)
 
 

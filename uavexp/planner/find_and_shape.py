@@ -132,7 +132,8 @@ class FindAndShape:
         """The believed movers with what is kept from them; none when they do not count at all."""
         tracks = request.tracks if self.mover_horizon_s > 0.0 else Tracks.none(request.time_s)
         if self.movers is MoversSeen.CURRENT:
-            tracks = replace(tracks, velocity_mps=np.zeros_like(tracks.velocity_mps))
+            still_mps = np.zeros_like(tracks.velocity_mps)
+            tracks = replace(tracks, velocity_mps=still_mps, swerve_m=Tracks.none().swerve_m)
         return MovingObstacles(
             tracks=tracks,
             field=request.field,

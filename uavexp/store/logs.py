@@ -39,6 +39,7 @@ _DAMAGE = (
     OSError, ValueError, KeyError, EOFError, MemoryError, NotImplementedError, RuntimeError, TypeError,
     SyntaxError, zipfile.BadZipFile, zlib.error, struct.error,
 )  # fmt: skip  # what unpacking a bad file raises
+_LATER = ("track_swerve_m",)  # added since: left out while empty, so that digests without it stay
 _RAGGED = ("changed_m", "trajectory_m")  # (n, 3) per replan, n differing
 
 
@@ -48,7 +49,7 @@ def log_arrays(log: TrialLog) -> Arrays:
     for name, value in flat(log).items():
         if name in EVENTS:
             arrays |= _event_arrays(name, EVENTS[name], value)
-        else:
+        elif name not in _LATER or value.size:
             arrays[name] = np.asarray(str(value) if isinstance(value, str) else value)
     return arrays
 

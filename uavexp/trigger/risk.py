@@ -73,7 +73,7 @@ class Radii(StrEnum):
 @nb.njit(cache=True)
 def approaches(
     path_m: Float, velocity_mps: Float, ahead_s: Float, position_m: Float, drift_mps: Float, half_m: Float,
-    same: bool,
+    same: bool, swerve_m: Float,
 ) -> Float:  # fmt: skip
     """Least distance to each mover, and relative and closing speed there, as rows (B, 3).
 
@@ -85,6 +85,7 @@ def approaches(
         drift_mps: (B, 3) their velocities.
         half_m: (B, 3) of the boxes around them.
         same: whether path and prediction are compared at the same instant only.
+        swerve_m: (B, N, 3) by how much the movers will be elsewhere than at these velocities; (B, 0, 3): not.
     """
     found = np.zeros((position_m.shape[0], 3))
     for b in range(position_m.shape[0]):
@@ -94,13 +95,20 @@ def approaches(
                 x = path_m[n, 0] - position_m[b, 0] - ahead_s[m] * drift_mps[b, 0]
                 y = path_m[n, 1] - position_m[b, 1] - ahead_s[m] * drift_mps[b, 1]
                 z = path_m[n, 2] - position_m[b, 2] - ahead_s[m] * drift_mps[b, 2]
+                if swerve_m.shape[1] > 0:
+                    x, y, z = x - swerve_m[b, m, 0], y - swerve_m[b, m, 1], z - swerve_m[b, m, 2]
                 gap = box_gap(half_m[b, 0], half_m[b, 1], half_m[b, 2], x, y, z)
                 if gap < least:
                     least, at_path, at_mover = gap, n, m
         squared, towards, away = 0.0, 0.0, 0.0
+        next_ = min(at_mover + 1, swerve_m.shape[1] - 1)
         for axis in range(3):
             speed = velocity_mps[at_path, axis] - drift_mps[b, axis]
             offset = path_m[at_path, axis] - position_m[b, axis] - ahead_s[at_mover] * drift_mps[b, axis]
+            if next_ > 0:
+                offset -= swerve_m[b, at_mover, axis]
+                turn_m = swerve_m[b, next_, axis] - swerve_m[b, next_ - 1, axis]
+                speed -= turn_m / (ahead_s[next_] - ahead_s[next_ - 1])
             squared += speed * speed
             towards -= speed * offset
             away += offset * offset
@@ -162,7 +170,7 @@ class Risk:
         path_m, velocity_mps, _ = evaluate(trajectory, times_s)
         found = approaches(
             path_m, velocity_mps, times_s - tracks.time_s, tracks.position_m, tracks.velocity_mps,
-            tracks.half_size_m, self.instant is Instant.SAME,
+            tracks.half_size_m, self.instant is Instant.SAME, tracks.swerved_m(times_s),
         )  # fmt: skip
         speed_mps = found[:, 2 if self.speed is Speed.CLOSING else 1]
         safe_m = speed_mps * self.speed_s + self._radius_m + self.margin_m

@@ -18,7 +18,7 @@ from uavexp.log import Contact, TrialLog
 from uavexp.metrics.metric import Flight, measured
 from uavexp.metrics.tracking_movers import METRICS, match, near_misses, predicted_errors_m, quality
 from uavexp.scan import RayScan
-from uavexp.types import Shape
+from uavexp.types import Shape, Tracks
 
 
 def still(times_s: Float) -> Float:
@@ -44,7 +44,7 @@ def test_the_first_update_is_that_of_the_textbook() -> None:
     """K = P H' (H P H' + R)^-1 of one axis, by hand."""
     motion, period, moved = MotionModel(), 0.1, 0.07
     filter_ = MotionFilter(np.zeros(3), motion)
-    filter_.predict(period)
+    filter_.predict(period, np.zeros(3), None)
     filter_.observe(np.array([moved, 0.0, 0.0]))
     r, q = motion.position_noise_m**2, motion.acceleration_density
     place = r + period**2 * motion.speed_mps**2 + q * period**3 / 3.0
@@ -77,7 +77,7 @@ def test_process_noise_rises_in_a_turn_and_falls_again() -> None:
     assert lag[20.0] < 0.85 * lag[1.0]
     filter_, misfit = MotionFilter(seen[0], MotionModel()), []
     for position_m in seen[1:]:
-        filter_.predict(0.1)
+        filter_.predict(0.1, np.zeros(3), None)
         filter_.observe(position_m)
         misfit.append(filter_.misfit)
     assert max(misfit[20:25]) > 3.0 * misfit[17]
@@ -88,7 +88,7 @@ def test_process_noise_rises_in_a_turn_and_falls_again() -> None:
 def test_what_is_not_finite_is_no_observation(bad: float) -> None:
     """filterpy's update(NaN) poisons the state without a word."""
     filter_ = MotionFilter(np.zeros(3), MotionModel())
-    filter_.predict(0.1)
+    filter_.predict(0.1, np.zeros(3), None)
     before = filter_.position_m.copy(), filter_.covariance.copy()
     filter_.observe(np.array([0.1, bad, 0.0]))
     assert np.array_equal(filter_.position_m, before[0])
@@ -162,7 +162,7 @@ def follow(tracker: Tracker, scans: list[Clusters], period_s: float = 0.1) -> li
     for scan in scans:
         tracker.predict(period_s, NOWHERE)
         tracker.observe(scan, BLIND, period_s)
-    return tracker.published(0.0).identity.tolist()
+    return tracker.published(0.0, NOWHERE).identity.tolist()
 
 
 def test_a_track_is_born_confirmed_by_motion_and_dies_unseen() -> None:
@@ -207,12 +207,12 @@ def test_a_filter_that_diverges_is_dropped_and_counted() -> None:
     follow(tracker, [front(4.0 + 0.1 * step) for step in range(8)])
     tracker.tracks[0].filter._kalman.x = np.full(6, np.nan)
     assert follow(tracker, [clusters()]) == []
-    assert tracker.published(0.0).dropped == 1
+    assert tracker.published(0.0, NOWHERE).dropped == 1
     fast = Tracker(RULE)
     follow(fast, [front(4.0 + 0.1 * step) for step in range(8)])
     fast.tracks[0].filter._kalman.x[3] = 50.0
     follow(fast, [clusters()])
-    assert fast.published(0.0).dropped == 1
+    assert fast.published(0.0, NOWHERE).dropped == 1
 
 
 def test_matching_keeps_the_pair_of_before_while_it_is_within_the_gate() -> None:
@@ -225,16 +225,22 @@ def test_matching_keeps_the_pair_of_before_while_it_is_within_the_gate() -> None
     assert match(np.full((2, 1), 5.0), {}, identity[:1], 1.0) == {}
 
 
+def track_of(time_s: float, position_m: Float, velocity_mps: Float) -> Tracks:
+    return Tracks(
+        time_s=time_s, identity=np.zeros(1, np.int64), position_m=position_m[None],
+        velocity_mps=velocity_mps[None], covariance=np.zeros((1, 6, 6)), half_size_m=np.zeros((1, 3)),
+    )  # fmt: skip
+
+
 def test_a_prediction_is_as_wrong_as_the_motion_is_curved() -> None:
     """On the unit circle at 1 m/s the tangent is (1 - cos t, t - sin t) off after t."""
     times_s, ahead_s = np.linspace(0.0, 5.0, 5001), (0.3, 0.6, 1.2)
     truth = np.stack([np.cos(times_s), np.sin(times_s), 0.0 * times_s], axis=1)
-    error = predicted_errors_m(
-        1.0, truth[1000], np.array([-np.sin(1.0), np.cos(1.0), 0.0]), times_s, truth, ahead_s
-    )
+    tangent = np.array([-np.sin(1.0), np.cos(1.0), 0.0])
+    error = predicted_errors_m(track_of(1.0, truth[1000], tangent), times_s, truth, ahead_s)
     t = np.array(ahead_s)
     assert np.allclose(error, np.hypot(1.0 - np.cos(t), t - np.sin(t)), atol=1e-6)
-    late = predicted_errors_m(4.5, truth[4500], np.zeros(3), times_s, truth, ahead_s)
+    late = predicted_errors_m(track_of(4.5, truth[4500], np.zeros(3)), times_s, truth, ahead_s)
     assert np.isfinite(late[0])
     assert np.isnan(late[1:]).all()
 

@@ -49,6 +49,7 @@ def policy(**parameters: Any) -> Risk:
 
 
 offsets = st.tuples(*[st.floats(-3.0, 3.0) for _ in range(3)])
+UNSWERVED = np.zeros((1, 0, 3))
 speeds = st.tuples(*[st.floats(-2.0, 2.0) for _ in range(3)])
 
 
@@ -63,7 +64,7 @@ def test_the_least_distance_of_two_straight_flights_is_that_of_the_closed_form(
     path = HERE_M + times[:, None] * own
     ((least, relative, closing),) = approaches(
         path, np.tile(own, (len(times), 1)), times, (HERE_M + np.array(offset))[None],
-        np.array([velocity]), POINT_M[None], True,
+        np.array([velocity]), POINT_M[None], True, UNSWERVED,
     )  # fmt: skip
     apart, drift = np.array(offset), np.array(velocity) - own
     square = float(drift @ drift)
@@ -85,7 +86,7 @@ def test_any_instant_is_never_farther_than_the_same_instant(
         HERE_M + times[:, None] * own, np.tile(own, (len(times), 1)), times,
         (HERE_M + np.array(offset))[None], np.array([velocity]), np.array([[0.3, 0.3, 0.8]]),
     )  # fmt: skip
-    assert approaches(*common, False)[0, 0] <= approaches(*common, True)[0, 0]
+    assert approaches(*common, False, UNSWERVED)[0, 0] <= approaches(*common, True, UNSWERVED)[0, 0]
 
 
 def test_paths_that_cross_at_different_times_meet_at_any_instant_only() -> None:

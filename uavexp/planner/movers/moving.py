@@ -1,9 +1,10 @@
 """Moving obstacles for planners: each predicted body is an obstacle at its own time only.
 
-A mover is the upright box around it, carried along at constant velocity and grown by the
-uncertainty of its centre, k sigma up to a cap. Where that leads into a mapped obstacle it will
-turn, and nobody knows where to: from then on it stays there and grows at its speed, up to another
-cap. What a plan must keep from it is the body's radius and a margin, for all times within the
+A mover is the upright box around it, carried along as predicted and grown by the
+uncertainty of its centre, k sigma up to a cap. Where that leads to a mapped obstacle it will
+turn, and nobody knows where to: from then on it stays there, unless its turn is predicted, too
+(`Tracks.swerve_m`), and grows at its speed, up to another cap. What a plan must keep from it is
+the body's radius and a margin, for all times within the
 horizon; beyond that a prediction says nothing, and nothing is asked. Any planner can use it:
 `clearance_m` judges a timed curve, `stamped` writes the movers into a copy of the map for searches
 that know no time.
@@ -21,10 +22,12 @@ import numpy as np
 from uavexp.arrays import Float, Float32
 from uavexp.errors import require_non_negative
 from uavexp.field import DistanceField
-from uavexp.types import PlanRequest, Tracks
+from uavexp.types import SWERVE_STEP_S, PlanRequest, Tracks
 
-COLUMNS = 17  # of a row: position 3, velocity 3, half size 3, variance 3, inset, cap, horizon, turn, speed
-INSET, CAP, HORIZON, TURN, SPEED = 12, 13, 14, 15, 16
+# of a row: position 3, velocity 3, half size 3, variance 3, inset, cap, horizon, turn, speed, time of
+# standing, and then its swerve at every `SWERVE_STEP_S`, three columns each, if that is predicted
+COLUMNS = 18
+INSET, CAP, HORIZON, TURN, SPEED, STANDS = 12, 13, 14, 15, 16, 17
 _LEAST_M = 0.05  # a stamped cell is closed, but no place that nothing can leave
 _SIGMAS = 1.0  # k
 _CAP_M = 0.3  # of the growth
@@ -43,8 +46,26 @@ def box_gap(half_x: float, half_y: float, half_z: float, x: float, y: float, z: 
 
 @nb.njit(cache=True, inline="always")
 def moved_s(row: Float, ahead_s: float) -> float:
-    """For how long a mover has moved on after a time: until it turned."""
-    return float(min(ahead_s, max(row[TURN], 0.0)))
+    """For how long a mover has moved on after a time: until it stands at what it turns at."""
+    return float(min(ahead_s, max(row[STANDS], 0.0)))
+
+
+@nb.njit(cache=True)
+def swerved_m(row: Float, first: int, ahead_s: float) -> tuple[float, float, float]:
+    """A mover's swerve (3,) after a time >= 0; the row's columns from `first` on have its places."""
+    steps = (row.shape[0] - first) // 3
+    if steps == 0:
+        return 0.0, 0.0, 0.0
+    at = max(ahead_s, 0.0) / SWERVE_STEP_S
+    before = min(int(at), steps - 1)
+    share, a, b = at - before, first + 3 * (before - 1), first + 3 * before
+    kept = 1.0 - share if before > 0 else 0.0  # of the place before, which is 0 at first
+    a = max(a, first)
+    return (
+        kept * row[a] + share * row[b],
+        kept * row[a + 1] + share * row[b + 1],
+        kept * row[a + 2] + share * row[b + 2],
+    )
 
 
 @nb.njit(cache=True, inline="always")
@@ -72,9 +93,12 @@ def clearance_after(movers: Float, x: float, y: float, z: float, ahead_s: float)
         if ahead_s > row[HORIZON]:
             continue
         on_s = moved_s(row, ahead_s)
+        aside = swerved_m(row, COLUMNS, ahead_s)
         gap = box_gap(
             row[6], row[7], row[8],
-            x - row[0] - on_s * row[3], y - row[1] - on_s * row[4], z - row[2] - on_s * row[5],
+            x - row[0] - on_s * row[3] - aside[0],
+            y - row[1] - on_s * row[4] - aside[1],
+            z - row[2] - on_s * row[5] - aside[2],
         )  # fmt: skip
         least = min(least, gap - grown_m(row, ahead_s) - row[INSET])
     return float(least)
@@ -133,6 +157,16 @@ def turns_s(tracks: Tracks, field: DistanceField, horizon_s: float) -> Float:
     return np.where(coming.any(axis=1), ahead_s[1:][np.argmax(coming, axis=1)], np.inf)
 
 
+def _way_m(row: Float) -> Float:
+    """Places (P, 3) between which a mover's centre is within its horizon."""
+    last_s = max(row[HORIZON], 0.0)
+    steps = (len(row) - COLUMNS) // 3
+    if not steps:
+        return np.asarray(row[:3] + np.array([[0.0], [last_s]]) * row[3:6])
+    ahead_s = np.append(np.arange(0.0, last_s, SWERVE_STEP_S), last_s)
+    return np.array([row[:3] + s * row[3:6] + swerved_m(row, COLUMNS, s) for s in ahead_s.tolist()])
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MovingObstacles:
     """The movers that a plan must keep away from, and by how much."""
@@ -159,11 +193,16 @@ class MovingObstacles:
     def table(self, from_s: float) -> Float:
         """Rows (B, COLUMNS) for kernels, with times counted from this absolute time."""
         tracks, ahead_s = self.tracks, from_s - self.tracks.time_s
-        rows = np.empty((len(tracks), COLUMNS))
+        swerve_m = tracks.swerved_m(from_s + SWERVE_STEP_S * np.arange(tracks.swerve_m.shape[1] + 1.0))
+        rows = np.empty((len(tracks), COLUMNS + 3 * tracks.swerve_m.shape[1]))
         if not len(tracks):
             return rows
-        rows[:, 0:3] = tracks.position_m + np.minimum(ahead_s, self._turn_s)[:, None] * tracks.velocity_mps
+        stands_s = np.full(len(tracks), np.inf) if tracks.swerve_m.size else self._turn_s
+        rows[:, 0:3] = tracks.position_m + np.minimum(ahead_s, stands_s)[:, None] * tracks.velocity_mps
         rows[:, 3:6], rows[:, 6:9] = tracks.velocity_mps, tracks.half_size_m
+        if tracks.swerve_m.size:  # what has been swerved by then is in the place
+            rows[:, 0:3] += swerve_m[:, 0]
+            rows[:, COLUMNS:] = (swerve_m[:, 1:] - swerve_m[:, :1]).reshape(len(tracks), -1)
         diagonal = np.einsum("nii->ni", tracks.covariance)
         mixed = np.einsum("nii->ni", tracks.covariance[:, :3, 3:])
         # variance of p + t v on the least certain level axis: a polynomial of t, from `from_s` on
@@ -175,7 +214,7 @@ class MovingObstacles:
         rows[:, 10], rows[:, 11] = both + 2.0 * ahead_s * speed, speed
         rows[:, INSET], rows[:, CAP] = self.body_radius_m + self.margin_m, _CAP_M
         rows[:, HORIZON], rows[:, TURN] = self.horizon_s - ahead_s, self._turn_s - ahead_s
-        rows[:, SPEED] = np.linalg.norm(tracks.velocity_mps, axis=1)
+        rows[:, SPEED], rows[:, STANDS] = np.linalg.norm(tracks.velocity_mps, axis=1), stands_s - ahead_s
         return rows
 
     def clearance_m(self, points_m: Float, times_s: Float) -> Float:
@@ -218,7 +257,7 @@ class MovingObstacles:
         distance = field.distance.copy()
         pace = np.array([np.linalg.norm(request.velocity_mps), speed_mps, acceleration_mps2])
         for row in table:
-            ends_m = row[:3] + np.array([[0.0], [max(row[HORIZON], 0.0)]]) * row[3:6]
+            ends_m = _way_m(row)
             turned_m = _TURN_CAP_M if row[TURN] < row[HORIZON] else 0.0
             reach_m = row[6:9] + row[INSET] + row[CAP] + turned_m + safe_m - least_m
             low_m, high_m = ends_m.min(axis=0) - reach_m, ends_m.max(axis=0) + reach_m

@@ -17,11 +17,12 @@ import numpy as np
 
 from uavexp.arrays import Float, Float32, Int
 from uavexp.field import value_and_gradient
-from uavexp.planner.movers.moving import HORIZON, INSET, TURN, grown_m, moved_s
+from uavexp.planner.movers.moving import COLUMNS, HORIZON, INSET, STANDS, grown_m, moved_s, swerved_m
 
 _AROUND_M = 0.25  # how far to the sides the static field is asked
 _REACH_M = 0.8  # a region farther than this from the predicted motion is no matter of this QP
 _FLAT = 0.3  # a gradient shorter than this is on a medial axis, and means nothing
+_SOON_S = 0.1  # over which the velocity of a predicted path is taken
 _LEAST_MPS = 0.1  # slower relative motion has no direction
 
 
@@ -78,9 +79,15 @@ def mover_planes(points: Float, velocities: Float, ahead_s: Float, movers: Float
             if ahead_s[k] > row[HORIZON]:
                 continue
             centre, half = row[0:3] + moved_s(row, ahead_s[k]) * row[3:6], row[6:9]
+            drift = row[3:6].copy() if ahead_s[k] <= row[STANDS] else np.zeros(3)
+            if row.shape[0] > COLUMNS:
+                now = swerved_m(row, COLUMNS, ahead_s[k])
+                then = swerved_m(row, COLUMNS, ahead_s[k] + _SOON_S)
+                for axis in range(3):
+                    centre[axis] += now[axis]
+                    drift[axis] += (then[axis] - now[axis]) / _SOON_S
             kept = row[INSET] + grown_m(row, ahead_s[k])
             apart = points[k] - centre
-            drift = row[3:6] if ahead_s[k] <= row[TURN] else np.zeros(3)
             unit = facing(apart, velocities[k] - drift, half, kept)
             support = (np.abs(unit) * half).sum() + kept
             if (unit * apart).sum() - support > _REACH_M:
