@@ -19,7 +19,11 @@ from uavexp.config.options import Option
 
 ROOT = Path(__file__).parents[1]
 PAPERS = {"mcr": "Paper 1", "voxel": "Paper 2", "inspect": "Paper 3", "dfbit": "Paper 4", "barn": "BARN"}
-SHIPPED = {"CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
+SHIPPED = {
+    "CONTRIBUTING.md": "contributing.md",
+    "CHANGELOG.md": "changelog.md",
+    "examples/README.md": "examples.md",
+}
 
 
 def on_config(config: MkDocsConfig) -> MkDocsConfig:

@@ -50,7 +50,8 @@ class Trial:
     own: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
-        where = f"{self.cell.strategy} in {self.cell.options['world']}, seed {self.seed}"
+        own = "".join(f", {group} {self.cell.options[group]}" for group in self.own if group != "trigger")
+        where = f"{self.cell.strategy}{own} in {self.cell.options['world']}, seed {self.seed}"
         return f"Trial({where}: {self.log.summary})"
 
     @property
