@@ -36,6 +36,10 @@ pages: $(STAMP)
 bench: $(STAMP)
 	@$(BIN)/python -m benchmarks
 
+# Which of sixty broken lines of the core no test notices (an hour)
+mutants: $(STAMP)
+	@$(BIN)/python -m tests.mutants $(ARGS_MUTANTS)
+
 # The digests of the golden flights, after a change of numbers that CHANGELOG names
 golden: $(STAMP)
 	@$(BIN)/python -m tests.golden

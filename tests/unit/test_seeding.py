@@ -12,7 +12,7 @@ import pytest
 from numpy.random import rand
 
 from uavexp.errors import ConfigError
-from uavexp.seeding import only_seeded_draws
+from uavexp.seeding import Stream, generator, only_seeded_draws
 
 DRAWS: dict[str, Callable[[], Any]] = {
     "numpy.random": np.random.random,
@@ -49,3 +49,12 @@ def test_the_global_generators_go_on_where_they_were() -> None:
     with only_seeded_draws(), pytest.raises(ConfigError):
         random.random()
     assert (random.getstate(), repr(np.random.get_state(legacy=False))) == before
+
+
+def test_a_stream_is_numpy_s_child_of_that_number() -> None:
+    """So every seed and stream draws on its own (numpy's SeedSequence, the same spawned in order)."""
+    for seed in (0, 7):
+        children = np.random.SeedSequence(seed).spawn(len(Stream))
+        for stream, child in zip(Stream, children, strict=True):
+            drawn = generator(seed, stream).random(4)
+            assert (drawn == np.random.Generator(np.random.PCG64(child)).random(4)).all()

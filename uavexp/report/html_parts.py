@@ -12,7 +12,12 @@ from uavexp.report.figures.base import Drawing
 from uavexp.report.judges import Verdict
 from uavexp.report.tables.base import Table
 
-_MARKS = {Verdict.REPRODUCED: "✓", Verdict.NOT_REPRODUCED: "✗", Verdict.NOT_TESTABLE: "–"}
+_MARKS = {
+    Verdict.REPRODUCED: "✓",
+    Verdict.CONTRADICTED: "✗",
+    Verdict.NOT_SHOWN: "?",
+    Verdict.NOT_TESTABLE: "–",
+}
 
 
 def paragraph(text: str) -> str:

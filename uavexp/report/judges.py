@@ -26,14 +26,16 @@ from uavexp.report.comparison import (
 from uavexp.report.labels import CLEARANCE, RATE, REPLANS
 from uavexp.report.paired import PairedTest, paired_tests
 from uavexp.report.results import Results
-from uavexp.report.significance import ALPHA, holm, smallest_p
+from uavexp.report.significance import ALPHA, holm, sign_flip_p, smallest_p
 from uavexp.report.statistics import Interval
 
 RULE = (
     "A claimed direction is reproduced when the difference has that sign and its p value (sign flips of "
-    "whole scenes, two-sided, Holm-corrected over the comparisons of one metric) is below 0.05; not "
-    "reproduced when it has not; not testable without the trials or with so few scenes that no p value "
-    "could be below 0.05. Lengths, times, tracking and smoothness are judged where both arms succeeded: a "
+    "whole scenes, two-sided, Holm-corrected over the comparisons of one metric) is below 0.05, contradicted "
+    "when it has the other sign and such a p value, else not shown; not testable without the trials or with "
+    "so few scenes that no p value could be below 0.05. A printed number is reproduced when the whole 95 % "
+    "interval lies within the claim's margin of it, contradicted when none of it does, else not shown: few "
+    "flights show nothing. Lengths, times, tracking and smoothness are judged where both arms succeeded: a "
     "path cut short by failure is not a shorter path."
 )
 
@@ -42,7 +44,8 @@ class Verdict(StrEnum):
     """Whether a claim of the paper holds here."""
 
     REPRODUCED = "reproduced"
-    NOT_REPRODUCED = "not reproduced"
+    CONTRADICTED = "contradicted"  # what is flown shows that it does not
+    NOT_SHOWN = "not shown"  # what is flown shows neither
     NOT_TESTABLE = "not testable"
 
 
@@ -67,15 +70,24 @@ def better_in_any(results: Results, *, arms: Sequence[str], metrics: Sequence[Me
         test for test in paired_tests(results.panel, metrics, [(first, second)]) if not test.both_succeeded
     ]
     corrected = [replace(test, p=min(1.0, len(tests) * test.found.p)) for test in tests]
-    verdict = min(map(_direction, corrected), key=list(Verdict).index)
-    return verdict, "; ".join(map(_numbers, tests)) + f"; p times {len(tests)} for the verdict"
+    numbers = "; ".join(map(_numbers, tests))
+    return _in_any(set(map(_direction, corrected))), f"{numbers}; p times {len(tests)} for the verdict"
+
+
+def _in_any(found: set[Verdict]) -> Verdict:
+    """What holds of any of several: reproduced if one is, contradicted if all that can be tested are."""
+    tested = found - {Verdict.NOT_TESTABLE}
+    if Verdict.REPRODUCED in tested or not tested:
+        return Verdict.REPRODUCED if tested else Verdict.NOT_TESTABLE
+    return Verdict.CONTRADICTED if tested == {Verdict.CONTRADICTED} else Verdict.NOT_SHOWN
 
 
 def _direction(test: PairedTest) -> Verdict:
     if not test.found.pairs or smallest_p(test.found.units) > ALPHA:
         return Verdict.NOT_TESTABLE
-    found = test.p < ALPHA and test.found.mean * test.metric.better > 0.0
-    return Verdict.REPRODUCED if found else Verdict.NOT_REPRODUCED
+    if test.p >= ALPHA:
+        return Verdict.NOT_SHOWN
+    return Verdict.REPRODUCED if test.found.mean * test.metric.better > 0.0 else Verdict.CONTRADICTED
 
 
 def _numbers(test: PairedTest) -> str:
@@ -94,18 +106,13 @@ def _numbers(test: PairedTest) -> str:
 
 
 def no_worse(results: Results, *, arms: Sequence[str], metric: Metric, margin: float) -> Ruling:
-    """The first arm is worse than the second by less than a margin (in the unit shown), or undecided."""
+    """The first arm is worse than the second by less than a margin (in the unit shown)."""
     first, second = arms
     found = compare(pairs_of(results.panel, first, second, [metric]), metric)
     worse = Interval(*sorted(-metric.better * end for end in _ends(found)))
-    if worse.high < margin:
-        verdict = Verdict.REPRODUCED
-    else:
-        verdict = Verdict.NOT_REPRODUCED if worse.low > 0.0 else Verdict.NOT_TESTABLE
-    return verdict, (
+    return _within(Interval(-math.inf, margin), worse), (
         f"{metric.label} against {second}: {number_format.difference(found, metric)}, {found.pairs} pairs; "
-        f"reproduced when the interval rules out a worsening by {margin:g}, not reproduced when it shows a "
-        "worsening and does not rule that out, else undecided"
+        f"reproduced when the interval rules out a worsening by {margin:g}, contradicted when it shows one"
     )
 
 
@@ -122,15 +129,22 @@ def no_worse_in_any_scene(results: Results, *, arms: Sequence[str], metric: Metr
     if len(scenes) < 2:
         return Verdict.NOT_TESTABLE, "a single scene"
     gain = metric.better * pairs.columns[metric.column] @ (1.0, -1.0)
-    worse = [name for number, name in enumerate(scenes) if np.nansum(gain[pairs.scene == number]) < 0.0]
-    return (
-        Verdict.NOT_REPRODUCED if worse else Verdict.REPRODUCED,
-        f"less often in {len(worse)} of {len(scenes)} scenes" + (f": {', '.join(worse)}" if worse else ""),
+    own = [gain[pairs.scene == number] for number in range(len(scenes))]
+    worse = [name for name, some in zip(scenes, own, strict=True) if np.nansum(some) < 0.0]
+    p = holm(np.array([sign_flip_p(some, np.arange(some.size), "less") for some in own]))
+    shown = np.nanmin(p, initial=1.0) < ALPHA
+    verdict = Verdict.REPRODUCED if not worse else Verdict.CONTRADICTED if shown else Verdict.NOT_SHOWN
+    return verdict, (
+        f"less often in {len(worse)} of {len(scenes)} scenes{': ' * bool(worse)}{', '.join(worse)}; "
+        f"contradicted when in one of them by more than chance, least p = "
+        f"{number_format.p_value(float(np.nanmin(p, initial=1.0)))} (sign flips of trials, Holm over scenes)"
     )
 
 
-def none(results: Results, *, arms: Sequence[str], metric: Metric, event: str) -> Ruling:
-    """No flight of the arm has the event that the metric counts."""
+def none(
+    results: Results, *, arms: Sequence[str], metric: Metric, event: str, at_most_percent: float = 2.0
+) -> Ruling:
+    """No flight of the arm has the event that the metric counts, and at most so many percent would."""
     (arm,) = arms
     counts = results.panel.values(metric, arm)
     n, hit = int(np.isfinite(counts).sum()), int((counts > 0.0).sum())
@@ -138,11 +152,17 @@ def none(results: Results, *, arms: Sequence[str], metric: Metric, event: str) -
         return Verdict.NOT_TESTABLE, "no flight"
     low, high = statistics.wilson_interval(hit, n)
     share, *ends = (number_format.number(100.0 * value, 1) for value in (hit / n, low, high))
-    verdict = Verdict.NOT_REPRODUCED if hit else Verdict.REPRODUCED
-    return verdict, f"{hit} of {n} flights with {event}, {share} % [{', '.join(ends)}]"
+    rare = 100.0 * high <= at_most_percent
+    verdict = Verdict.CONTRADICTED if hit else Verdict.REPRODUCED if rare else Verdict.NOT_SHOWN
+    return verdict, (
+        f"{hit} of {n} flights with {event}, {share} % [{', '.join(ends)}]; reproduced when there is none "
+        f"and the interval ends below {at_most_percent:g} %"
+    )
 
 
-def saved(results: Results, *, arms: Sequence[str], metric: Metric, percent: float) -> Ruling:
+def saved(
+    results: Results, *, arms: Sequence[str], metric: Metric, percent: float, margin: float = 5.0
+) -> Ruling:
     """The first arm has so many percent less of the metric than the second, by the ratio of the means."""
     panel, (first, second) = results.panel, arms
     means = [estimate(panel, metric, arm) for arm in arms]
@@ -152,30 +172,43 @@ def saved(results: Results, *, arms: Sequence[str], metric: Metric, percent: flo
     ratio = samples[:, panel.arms.index(first)] / samples[:, panel.arms.index(second)]
     ends = interval_of(100.0 * (1.0 - ratio), statistics.units_of(panel.cluster))
     found = number_format.number(100.0 * (1.0 - means[0].mean / means[1].mean), 0)
-    return _within(percent, ends), (
-        f"saved: {found} % {number_format.interval(ends, 0)}; reproduced when the printed share lies in the "
-        "interval"
+    return _within(_around(percent, margin), ends), (
+        f"saved: {found} % {number_format.interval(ends, 0)}; margin {margin:g} points around {percent:g} %"
     )
 
 
-def value(results: Results, *, arms: Sequence[str], metric: Metric) -> Ruling:
-    """The arm's mean is the one that the paper prints (`reference.csv`)."""
+def value(results: Results, *, arms: Sequence[str], metric: Metric, margin: float | None = None) -> Ruling:
+    """The arm's mean is the one that the paper prints (`reference.csv`), give or take a margin.
+
+    Args:
+        results: of the study.
+        arms: the arm.
+        metric: whose mean is printed.
+        margin: in the unit shown; by default a tenth of what is printed.
+    """
     (arm,) = arms
     printed = results.printed.get((metric.column, arm))
     if printed is None:
         return Verdict.NOT_TESTABLE, "the paper prints no such number"
     found = estimate(results.panel, metric, arm)
     mean = number_format.mean_with_interval(found, metric, found.n)
-    return (
-        _within(printed.mean, found.interval),
-        f"{mean}; reproduced when the printed mean lies in the interval",
-    )
+    spare = 0.1 * printed.mean if margin is None else margin
+    verdict = _within(_around(printed.mean, spare), found.interval)
+    return verdict, f"{mean}; margin {spare:g} around {printed.mean:g}"
 
 
-def _within(printed: float, ends: Interval) -> Verdict:
-    if math.isnan(ends.low):
+def _around(middle: float, margin: float) -> Interval:
+    return Interval(middle - margin, middle + margin)
+
+
+def _within(asked: Interval, found: Interval) -> Verdict:
+    """Whether an interval lies within what is asked, beside it, or neither."""
+    if math.isnan(found.low):
         return Verdict.NOT_TESTABLE
-    return Verdict.REPRODUCED if ends.low <= printed <= ends.high else Verdict.NOT_REPRODUCED
+    if asked.low <= found.low and found.high <= asked.high:
+        return Verdict.REPRODUCED
+    beside = found.high < asked.low or found.low > asked.high
+    return Verdict.CONTRADICTED if beside else Verdict.NOT_SHOWN
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -191,6 +224,11 @@ class _Rival:
     def p(self) -> float:
         """All three must hold: the largest of their p values (Berger 1982, intersection-union test)."""
         return max(self.success.p, self.clearance.p, self.replans.p)
+
+    def loses(self, success_percent: float, clearance_m: float) -> bool:
+        """Whether an interval rules one of the three out."""
+        success, clearance, replans = (_ends(one) for one in (self.success, self.clearance, self.replans))
+        return success.high < -success_percent or clearance.high < -clearance_m or replans.low > 0.0
 
 
 def trade_off(
@@ -212,7 +250,8 @@ def trade_off(
     corrected = holm(np.array([rival.p for rival in paired]))
     best = int(np.argmin(corrected))
     rival, p = paired[best], float(corrected[best])
-    verdict = Verdict.REPRODUCED if p < ALPHA else Verdict.NOT_REPRODUCED
+    lost = all(one.loses(success_percent, clearance_m) for one in paired)
+    verdict = Verdict.REPRODUCED if p < ALPHA else Verdict.CONTRADICTED if lost else Verdict.NOT_SHOWN
     if len(paired) * smallest_p(rival.success.units, "greater") > ALPHA:
         verdict = Verdict.NOT_TESTABLE
     return verdict, (
@@ -220,7 +259,8 @@ def trade_off(
         f"clearance {number_format.difference(rival.clearance, CLEARANCE)} m, "
         f"replans {number_format.difference(rival.replans, REPLANS)}; p = {number_format.p_value(p)} (sign "
         f"flips of scenes for all three, success less by under {success_percent:g} points and "
-        f"clearance by under {clearance_m:g} m allowed, Holm over {len(paired)} arms)"
+        f"clearance by under {clearance_m:g} m allowed, Holm over {len(paired)} arms); contradicted when an "
+        "interval rules one of the three out for every arm"
     )
 
 

@@ -126,8 +126,8 @@ class TestOneFile:
             assert shown in page.words
 
     def test_verdicts_are_counted_and_told_by_more_than_colour(self, page):
-        assert "1 reproduced, 1 not reproduced, 1 not testable" in page.words
-        for mark in ("✓ reproduced", "✗ not reproduced", "– not testable"):
+        assert "1 reproduced, 1 contradicted, 1 not shown, 1 not testable" in page.words
+        for mark in ("✓ reproduced", "✗ contradicted", "? not shown", "– not testable"):
             assert mark in page.words
 
     def test_the_verdict_stands_first_then_what_was_flown(self, page, flown):

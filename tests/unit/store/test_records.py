@@ -146,6 +146,16 @@ def test_a_changed_record_is_refused(tmp_path: Path, damage: object) -> None:
         read_record(tmp_path)
 
 
+def test_every_digit_of_the_seal_counts(tmp_path: Path) -> None:
+    text = seal({"seed": 7, "metrics": {"x": 1.5}})
+    whole = json.loads(text)["sha256"]
+    for place in range(len(whole)):
+        other = whole[:place] + ("0" if whole[place] != "0" else "1") + whole[place + 1 :]
+        (tmp_path / "record.json").write_text(text.replace(whole, other))
+        with pytest.raises(RecordError, match="sha256"):
+            read_record(tmp_path)
+
+
 def test_a_record_of_another_schema_is_refused_even_when_sealed(tmp_path: Path) -> None:
     body = {"seed": 7, "metrics": {}, "schema": 99}
     (tmp_path / "record.json").write_text(json.dumps({**body, "sha256": digest(body)}))

@@ -1,0 +1,1 @@
+"""One-line mutations of the core that the tests must notice: `make mutants`."""
