@@ -13,9 +13,8 @@ from uavexp.show.__main__ import main as show
 from uavexp.store.study import Study
 
 WIDTHS_PX = (1400, 390)
-DRAWN_PX = (
-    WIDTHS_PX if SHOTS else (390,)
-)  # a flight is drawn slowly without a graphics card; narrow is harder
+# a flight is drawn slowly without a graphics card; the narrow window is the harder one
+DRAWN_PX = WIDTHS_PX if SHOTS else (390,)
 _DRAWN = """new Promise(done => {
   const scene = () => document.querySelector('#flight')._fullLayout?.scene?._scene?.glplot;
   const ask = () => scene() ? done(true) : setTimeout(ask, 100);

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from uavexp.errors import ConfigError
 from uavexp.interrupts import exit_code_of
 
 _USAGE = """usage: python -m uavexp.report DIR [DIR ...] [--pictures]
+       python -m uavexp.report DIR --watch [--port=N]
 
 Writes tables, figures, claims and report.html of each study folder from its stored trials;
 nothing is flown. DIR: a folder that `python -m uavexp` left behind, e.g. outputs/mcr/table1
   --pictures   draw picture.png of every flown trial that has none instead
+  --watch      show a study while it is flown, on a page of this machine: progress, failures, tables so far
 """
-_PICTURES = "--pictures"
+_PICTURES, _WATCH, _PORT = "--pictures", "--watch", "--port="
+_HIGHEST_PORT = 65535
 _PATIENCE_S = 2.0  # nothing is said about work that is done sooner
 
 
@@ -27,11 +32,44 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     os.environ["MPLBACKEND"] = "Agg"
     typed = sys.argv[1:] if arguments is None else arguments
-    names = [word for word in typed if word != _PICTURES]
-    if not names or {"-h", "--help"} & set(names):
-        (sys.stdout if names else sys.stderr).write(_USAGE)
-        return 0 if names else 2
-    return exit_code_of(lambda: _make(names, _report if len(names) == len(typed) else _draw))
+    flags = [word for word in typed if word.startswith("-")]
+    names = [word for word in typed if word not in flags]
+    is_asked = bool({"-h", "--help"} & set(flags))
+    if is_asked or not names:
+        (sys.stdout if is_asked else sys.stderr).write(_USAGE)
+        return 0 if is_asked else 2
+    return exit_code_of(lambda: _run(names, flags))
+
+
+def _run(names: Sequence[str], flags: Sequence[str]) -> int:
+    for flag in flags:
+        if flag not in (_PICTURES, _WATCH) and not flag.startswith(_PORT):
+            raise ConfigError(f"no such flag: {flag}; there are {_PICTURES}, {_WATCH} and {_PORT}N")
+    if _WATCH in flags:
+        return _watch(names, flags)
+    return _make(names, _draw if _PICTURES in flags else _report)
+
+
+def _watch(names: Sequence[str], flags: Sequence[str]) -> int:
+    from uavexp.report.watch import watch
+
+    ports = [flag.removeprefix(_PORT) for flag in flags if flag.startswith(_PORT)]
+    if len(names) > 1:
+        raise ConfigError(f"{_WATCH} shows one folder, got {', '.join(names)}")
+    if any(not port.isdecimal() or int(port) > _HIGHEST_PORT for port in ports):
+        raise ConfigError(f"{_PORT}N takes a number from 0 to {_HIGHEST_PORT}, got {ports[-1]}")
+    for number in (signal.SIGINT, signal.SIGTERM):  # a job begun with & ignores the first
+        signal.signal(number, signal.default_int_handler)
+    try:
+        watch(Path(names[0]), _tell, *map(int, ports[-1:]))
+    except KeyboardInterrupt:  # how watching ends
+        return 0
+    return 0
+
+
+def _tell(line: str) -> None:
+    sys.stdout.write(f"{line}\n")
+    sys.stdout.flush()
 
 
 def _make(names: Sequence[str], make: Callable[[Path], None]) -> int:
@@ -53,8 +91,7 @@ def _report(folder: Path) -> None:
     begin_s = time.monotonic()
 
     def tell(line: str) -> None:
-        sys.stdout.write(f"{folder}: {line}\n")
-        sys.stdout.flush()
+        _tell(f"{folder}: {line}")
 
     def say(line: str) -> None:
         if time.monotonic() - begin_s > _PATIENCE_S:

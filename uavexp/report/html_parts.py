@@ -59,7 +59,7 @@ def table(made: Table) -> str:
 
 def grid(head: Iterable[str], rows: Iterable[str], *, table_class: str = "") -> str:
     """A table that scrolls in itself below its own head, and sorts by a click on a column's name."""
-    columns, body = "".join(f"<th>{escape(column)}</th>" for column in head), "\n".join(rows)
+    columns, body = "".join(f'<th tabindex="0">{escape(column)}</th>' for column in head), "\n".join(rows)
     kind = f"sortable {table_class}".strip()
     return (
         f'<div class="wide"><table class="{kind}"><thead><tr>{columns}</tr></thead>\n'
