@@ -28,7 +28,8 @@ its reference but for an error below the same margin (the pace falls to 0 as the
 `stop_error_m`); the pose is right (drift is not seen). The start is free for `start_bubble_m` or as
 far as it is in truth, whichever is less; out of what was not seen around it the vehicle creeps, at
 `creep_mps`, as long as the cell of its centre was seen. A vehicle that is pushed off, or that fell
-behind, stops in a straight line.
+behind, stops in a straight line. With `person_mps` it is also slow enough everywhere to stop before somebody
+who steps out of a place that is hidden now; whoever is in sight is the planner's and the trigger's.
 
 Source: Tordesillas, Lopez, Everett and How, FASTER, T-RO 2021; Ren et al., SUPER, Science Robotics 2025.
 There a second trajectory is the back-up; here the plan's own way is, slowed.
@@ -57,8 +58,15 @@ from uavexp.parameters import (
     option,
 )
 from uavexp.safety.base import Flyable, Guard
+from uavexp.safety.hidden import PERSON_M, walks_m
 from uavexp.safety.looked_at import look_at
-from uavexp.safety.speed_profile import Effort, Way, fastest_rates
+from uavexp.safety.speed_profile import (
+    Effort,
+    Way,
+    fastest_rates,
+    room_before_person_m,
+    speed_before_person_mps,
+)
 from uavexp.trajectory import Trajectory, evaluate
 from uavexp.types import Limits, Observation, Squeeze
 
@@ -85,6 +93,8 @@ class Committed:
     narrow_clearance_m: NarrowClearance = 0.22  # m, clearance of narrow places, which are flown slowly [ours]
     narrow_speed_mps: NarrowSpeed = 1.0  # m/s, in narrow places [ours]
     creep_mps: NonNegative = 0.3  # m/s, out of a place whose surroundings were not seen [ours]
+    person_mps: NonNegative = 0.0  # m/s, of somebody who may step out of the nearest hidden place (`hidden`):
+    # the vehicle can always stop before; 0: nobody does [ours]
     stop_error_m: Positive = 0.25  # m, tracking error at which time stands; from half of it on it runs
     # slower [ours]
 
@@ -203,7 +213,21 @@ class _Commitment:
         verified[ahead.along_m <= _HERE_M] = True
         bound_mps = np.where(clearance_m < wide_m, narrow_mps, np.inf)
         bound_mps[creeps] = np.minimum(bound_mps[creeps], rules.creep_mps)
-        return verified, bound_mps
+        return verified, np.minimum(bound_mps, self._before_person_mps(ahead, observation))
+
+    def _before_person_mps(self, ahead: _Ahead, observation: Observation) -> Float | float:
+        """Speed (N,) from which it stops before somebody who steps out of a hidden place is there.
+
+        At least `creep_mps`: slower than anybody walks it goes on.
+        """
+        rules, limits = self.rules, self.limits
+        if rules.person_mps == 0.0:
+            return np.inf
+        stop = (rules.person_mps, limits.max_acceleration_mps2, rules.reaction_s)
+        apart_m = limits.body_radius_m + PERSON_M
+        far_m = room_before_person_m(limits.max_speed_mps, *stop) + apart_m
+        walk_m = walks_m(observation.field, observation.state.position_m, ahead.point_m, far_m)
+        return np.maximum(speed_before_person_mps(walk_m - apart_m, *stop), rules.creep_mps)
 
     def _top_rate(self, observation: Observation) -> float:
         """1 for a vehicle that is near its reference, down to 0."""

@@ -45,6 +45,32 @@ class Effort(NamedTuple):
     reaction_s: float  # by which slowing begins earlier than the acceleration asks for
 
 
+def speed_before_person_mps(
+    walk_m: Float, person_mps: float, deceleration_mps2: float, reaction_s: float
+) -> Float:
+    """Fastest speed (N,) from which a stop is over before somebody who comes towards it is there.
+
+    In the stop, t + v / a, both come nearer: v t + v² / 2 a + w (t + v / a) <= d.
+
+    Args:
+        walk_m: (N,) free way d between the two, m; negative: none.
+        person_mps: speed w of the person, m/s.
+        deceleration_mps2: a of the stop.
+        reaction_s: t before it begins.
+    """
+    both_s = reaction_s + person_mps / deceleration_mps2
+    left_m = np.maximum(walk_m - person_mps * reaction_s, 0.0)
+    return np.asarray(deceleration_mps2 * (np.sqrt(both_s**2 + 2.0 * left_m / deceleration_mps2) - both_s))
+
+
+def room_before_person_m(
+    speed_mps: float, person_mps: float, deceleration_mps2: float, reaction_s: float
+) -> float:
+    """The free way d from which on that speed is no slower than this one, m."""
+    stop_s = reaction_s + speed_mps / deceleration_mps2
+    return speed_mps * reaction_s + speed_mps**2 / (2.0 * deceleration_mps2) + person_mps * stop_s
+
+
 @nb.njit(cache=True)
 def _steepest(way: Way, n: int, x: float, most_mps2: float, sign: float) -> float:
     """Least (sign -1) or greatest (1) u at a sample, 1/s; to hold the rate is always allowed."""

@@ -25,6 +25,7 @@ OPTIONAL = {
     "map_origin_m": "3", "map_voxel_size_m": "", "map_shape": "3", "map_free": "F", "map_occupied_s": "N",
     "mover_shape": "B", "mover_half_size_m": "B 3", "mover_position_m": "T B 3", "mover_clearance_m": "T",
     "track_count": "M", "track_identity": "S", "track_position_m": "S 3", "track_velocity_mps": "S 3",
+    "track_swerve_m": "S J 3",
     "plan_path_m": "P 3", "plan_breaks_s": "K1", "plan_coefficients": "K D 3", "plan_history": "H 2",
     "plan_tree_m": "E 2 3", "plan_collision_checks": "",
     "max_speed_mps": "", "max_acceleration_mps2": "", "body_radius_m": "",
