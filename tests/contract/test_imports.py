@@ -26,7 +26,7 @@ LAYERS = (
     {"export"},
     {"report"},
     {"study"},
-    {"show", "judge"},
+    {"show", "judge", "replay"},
     {"sweep"},
     {"cli"},
     {"__main__"},

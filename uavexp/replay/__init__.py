@@ -1,0 +1,1 @@
+"""Recorded depth images through map and triggers: `python -m uavexp.replay FOLDER`."""
