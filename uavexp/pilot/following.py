@@ -14,7 +14,7 @@ import numpy as np
 from uavexp.arrays import Float
 from uavexp.geometry import wrap_angle
 from uavexp.pace import evaluate_paced
-from uavexp.pilot.heading import bearing_rad, rate_to
+from uavexp.pilot.heading import bearing_rad, glanced_rad, rate_to
 from uavexp.trajectory import evaluate_pieces
 from uavexp.types import Reference
 
@@ -31,6 +31,8 @@ def follow(
     yaw_rad: float,
     most_radps: float,
     step_s: float,
+    glance_rad: float,
+    most_glance_rad: float,
 ) -> Float:
     """Rows (N, 14) of the steps at times (N,), the yaw turning from step to step.
 
@@ -46,6 +48,8 @@ def follow(
         yaw_rad: before the first step.
         most_radps: fastest turn.
         step_s: of a step.
+        glance_rad: bearing of whom to look at on the way; NaN: nobody.
+        most_glance_rad: by which the yaw leaves the way for it at most.
     """
     now_s, position, velocity, acceleration, jerk = evaluate_paced(breaks_s, coefficients, pace, times_s)
     ahead_s = np.minimum(np.maximum(now_s, moves_s) + lookahead_s, np.maximum(now_s, breaks_s[-1]))
@@ -54,6 +58,8 @@ def follow(
     rows[:, 0:3], rows[:, 3:6], rows[:, 6:9], rows[:, 11:14] = position, velocity, acceleration, jerk
     for n in range(len(times_s)):
         bearing = bearing_rad(wanted_rad, ahead[n])
+        if math.isnan(wanted_rad) and not math.isnan(glance_rad):
+            bearing = glanced_rad(bearing, glance_rad, most_glance_rad)
         if not math.isnan(bearing):
             rows[n, 10] = rate_to(bearing, yaw_rad, most_radps)
             yaw_rad = wrap_angle(yaw_rad + rows[n, 10] * step_s)

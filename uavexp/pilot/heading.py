@@ -28,6 +28,15 @@ def bearing_rad(wanted_rad: float, ahead_m: Float) -> float:
 
 
 @nb.njit(cache=True)
+def glanced_rad(way_rad: float, glance_rad: float, most_rad: float) -> float:
+    """The bearing of the way (NaN: none), turned to somebody else by so much at most."""
+    if math.isnan(way_rad):
+        return glance_rad
+    aside_rad = wrap_angle(glance_rad - way_rad)
+    return float(wrap_angle(way_rad + min(max(aside_rad, -most_rad), most_rad)))
+
+
+@nb.njit(cache=True)
 def rate_to(bearing_rad: float, yaw_rad: float, most_radps: float) -> float:
     """How fast to turn towards a bearing, rad/s."""
     rate_radps = _GAIN_PER_S * wrap_angle(bearing_rad - yaw_rad)

@@ -27,6 +27,7 @@ from uavexp.pace import AS_PLANNED
 from uavexp.pilot.base import Crew
 from uavexp.pilot.flown import Flown, is_held, stopped_off
 from uavexp.pilot.following import reference_of, row_of
+from uavexp.pilot.glance import towards_encounter_rad
 from uavexp.pilot.heading import room_to_turn
 from uavexp.pilot.noting import NO_GOAL, error_of, here, replan_of, target_of
 from uavexp.pilot.recovering import Recovering, ending, tried
@@ -139,6 +140,8 @@ class HoldingPilot:
 
     def decide(self, observation: Observation) -> float:
         """Ask safety and trigger; return the trigger's score."""
+        if self.rules.glance_rad > 0.0:
+            self.steering.glance_rad = towards_encounter_rad(observation, self.trajectory)
         self.recovery.look(observation)
         behind = self._stops_behind(observation)
         wary = self.recovery.ladder.climbing or observation.time_s < self._touched_s + _WARY_S

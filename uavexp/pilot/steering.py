@@ -26,6 +26,7 @@ class Steering:
     yaw_rad: float
     most_radps: float
     turns: bool = True  # there is room for it
+    glance_rad: float = math.nan  # bearing of whom to look at besides the way; NaN: nobody
 
     def follow(self, flown: Flown, wanted_rad: float, times_s: Float, step_s: float) -> Float:
         """Rows (N, 14) of `following` along what is flown, the yaw turned; backwards it stays."""
@@ -34,6 +35,7 @@ class Steering:
         rows: Float = follow(
             flown.trajectory.breaks_s, flown.trajectory.coefficients, pace, times_s, flown.moves_s,
             self.rules.yaw_lookahead_s, wanted_rad, self.yaw_rad, most_radps, step_s,
+            self.glance_rad, self.rules.glance_rad,
         )  # fmt: skip
         self.yaw_rad = float(rows[-1, 9])
         return rows
