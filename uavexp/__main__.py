@@ -24,8 +24,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     0; 1 a trial did not run to its end or the disk was full; 2 bad input; 130 interrupted.
     """
     os.environ["MPLBACKEND"] = "Agg"
+    typed = sys.argv[1:] if arguments is None else arguments
+    if typed[:1] == ["tune"]:
+        from uavexp.tune.__main__ import main as tune
+
+        return tune(typed[1:])
     leave_at_once()
-    return exit_code_of(lambda: _run(sys.argv[1:] if arguments is None else arguments))
+    return exit_code_of(lambda: _run(typed))
 
 
 def _parse(arguments: Sequence[str]) -> argparse.Namespace:

@@ -29,6 +29,7 @@ LAYERS = (
     {"show", "judge", "replay"},
     {"sweep"},
     {"cli"},
+    {"tune"},
     {"__main__"},
 )
 HYDRA = ("hydra", "omegaconf")

@@ -20,6 +20,7 @@ python -m uavexp [GROUP=OPTION ...] [GROUP.PARAMETER=VALUE ...] [seed=SEEDS] [ou
   python -m uavexp -m strategy=mcr trigger.delta_map_m=0.05,0.10,0.15 seed=0:20
   python -m uavexp experiments=mcr/table1           every trial, table and figure of one paper table
   python -m uavexp experiments=mcr/table1 seed=0:2 arm=MCR,TBR      less of it
+  python -m uavexp tune strategy=tbr trigger.interval_s=0.5:5       the best settings of a parameter
   python -m uavexp world=file world.path=office.ply your own building
   python -m uavexp --help world                     the parameters of one group
 

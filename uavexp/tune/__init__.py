@@ -1,0 +1,1 @@
+"""Choosing parameters by flying: `python -m uavexp tune` (Optuna)."""
