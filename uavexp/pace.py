@@ -53,6 +53,8 @@ def pace_over(start_s: float, own_s: Float, rate: Float, early_s: float = 0.0) -
     own_s, rate = own_s[:knots].copy(), rate[:knots]
     if knots > 1 and rate[-1] == 0.0:
         own_s[-1] -= early_s
+        if own_s[-1] <= own_s[-2]:  # it rests at the knot before, where all that is left is rounding
+            own_s, rate = own_s[:-1], np.append(rate[:-2], 0.0)
     spans_s = 2.0 * np.diff(own_s) / (rate[1:] + rate[:-1])
     return Pace(times_s=start_s + np.append(0.0, np.cumsum(spans_s)), own_s=own_s, rate=rate)
 

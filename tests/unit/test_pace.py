@@ -87,3 +87,13 @@ def test_a_pace_that_rests_stays_where_it_rests_and_is_the_curve_delayed_from_th
 def test_who_stands_already_has_a_pace_of_one_knot() -> None:
     pace = pace_over(3.0, np.array([3.0, 3.02]), np.array([0.0, 0.0]), early_s=0.02)
     assert (len(pace.rate), pace.rests_s, pace.own_s[0]) == (1, 3.0, 3.0)
+
+
+def test_a_rate_that_is_only_rounding_before_the_rest_is_the_rest() -> None:
+    """Two knots at one time used to stop the flight with a division by zero."""
+    own_s, rate = np.array([1.0, 1.02, 1.04, 1.06]), np.array([0.8, 0.6, 1e-8, 0.0])
+    pace = pace_over(1.0, own_s, rate, early_s=0.02)
+    assert (np.diff(pace.times_s) > 0.0).all()
+    assert pace.rests_s == pace.times_s[-1]
+    assert pace.own_s[-1] == pytest.approx(1.04)
+    assert np.isfinite(pace.at(float(pace.times_s[-1]) + 1.0)).all()

@@ -1,0 +1,117 @@
+"""Ways between the places to be visited, and the order in which a short tour visits them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from uavexp.arrays import Float, Int
+from uavexp.explorer.volume.cells import Cells
+from uavexp.explorer.volume.waves import FAR, MOST_PRICE, UNIT, Wave, begin, forget, least_change, new_wave, reach
+from uavexp.inspection.tour import open_tour
+
+_KNOWN = np.array([0.0, 0.0, 1.0])  # prices of the kinds of cells: ways lead over free ones alone
+_NEAREST = 6  # places to which ways are sought; those to farther ones lead through these
+_KICKS_PER_PLACE = 10
+_PLACES = 60  # that a tour visits, the nearest; farther ones wait for the next
+_MEMORY = 20_000  # pairs
+
+
+def _metres(cost: int, cell_m: float) -> float:
+    return cost * cell_m / UNIT if cost < FAR else np.inf
+
+
+@dataclass(slots=True, kw_only=True)
+class Ways:
+    """Lengths of ways over the cells of a map, from the vehicle, to the target, and between places."""
+
+    cells: Cells
+    unseen_price: float  # of a cell that was not seen, on ways to the target
+    target: int | None = None  # cell
+    _vehicle: int = -1
+    _own: Wave = field(init=False, repr=False)
+    _other: Wave = field(init=False, repr=False)
+    _beyond: Wave = field(init=False, repr=False)
+    _between: dict[tuple[int, int], float] = field(init=False, repr=False, default_factory=dict)
+
+    def __post_init__(self) -> None:
+        size = self.cells.kind.size
+        self._own, self._other, self._beyond = new_wave(size), new_wave(size), new_wave(size)
+        if self.target is not None:
+            begin(self._beyond, self.target)
+
+    @property
+    def _optimistic(self) -> Float:
+        return np.array([0.0, min(self.unseen_price, MOST_PRICE), 1.0])
+
+    def note(self, changed: Int) -> None:
+        """Take note of cells (C,) that have changed their kind."""
+        cells = self.cells
+        if self.target is not None and len(changed):
+            level = least_change(self._beyond, cells.steps, changed)
+            if level < FAR - 1:
+                forget(self._beyond, cells.kind, cells.steps, self._optimistic, level)
+
+    def begin(self, vehicle: int) -> None:
+        """Ask for ways from this cell."""
+        self._vehicle = vehicle
+        begin(self._own, vehicle)
+
+    def there_m(self, cell: int) -> float:
+        """Length of the way from the vehicle over free cells; inf when there is none."""
+        if cell == self._vehicle:
+            return 0.0
+        cells = self.cells
+        return _metres(reach(self._own, cells.kind, cells.steps, _KNOWN, cell, FAR), cells.cell_m)
+
+    def beyond_m(self, cell: int) -> float:
+        """Length of the way to the target, unseen cells being passable at their price; 0 without a target."""
+        if self.target is None:
+            return 0.0
+        cells = self.cells
+        cost = reach(self._beyond, cells.kind, cells.steps, self._optimistic, cell, FAR)
+        return _metres(cost, cells.cell_m)
+
+    def tour(self, places: Int, first_m: Float, there_m: Float) -> Int:
+        """Order (P,) in which a short tour from the vehicle visits places.
+
+        Args:
+            places: (P,) cells.
+            first_m: (P,) what it costs to begin with each.
+            there_m: (P,) length of the way from the vehicle to each, finite.
+        """
+        kept = np.argsort(there_m, kind="stable")[:_PLACES]
+        between = self._matrix(places[kept], there_m[kept])
+        cost = np.zeros((len(kept) + 1, len(kept) + 1))
+        cost[0, 1:] = cost[1:, 0] = first_m[kept]
+        cost[1:, 1:] = between
+        return np.asarray(kept[open_tour(cost, kicks=_KICKS_PER_PLACE * len(kept))[1:] - 1])
+
+    def _matrix(self, places: Int, there_m: Float) -> Float:
+        """Lengths (P, P) of ways between places."""
+        count, middle = len(places), self.cells.centre_m(places)
+        over = there_m[:, None] + there_m  # through where the vehicle is
+        straight = np.linalg.norm(middle[:, None] - middle, axis=2)
+        if len(self._between) > _MEMORY:
+            self._between.clear()
+        for a in range(count):
+            near = np.argsort(straight[a], kind="stable")[1 : _NEAREST + 1]
+            missing = [int(b) for b in near if (int(places[a]), int(places[b])) not in self._between]
+            if missing:
+                self._measure(int(places[a]), places[missing], over[a, missing])
+            for b in near:
+                over[a, b] = over[b, a] = min(over[a, b], self._between[int(places[a]), int(places[b])])
+        for via in range(count):  # Floyd and Warshall
+            np.minimum(over, over[:, via, None] + over[via], out=over)
+        np.fill_diagonal(over, 0.0)
+        return np.asarray(np.minimum(over, over.T))
+
+    def _measure(self, start: int, ends: Int, most_m: Float) -> None:
+        """Note the lengths of ways from one place to others, as far as they are no longer than `most_m`."""
+        cells = self.cells
+        begin(self._other, start)
+        for end, bound_m in zip(ends.tolist(), most_m.tolist(), strict=True):
+            most = int(bound_m / cells.cell_m * UNIT) + 1
+            cost = reach(self._other, cells.kind, cells.steps, _KNOWN, end, most) if end != start else 0
+            self._between[start, end] = self._between[end, start] = _metres(cost, cells.cell_m)

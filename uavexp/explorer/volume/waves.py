@@ -1,0 +1,188 @@
+"""Least costs of ways over cells of space, spreading from one cell as far as somebody asks (numba).
+
+As `explorer.waves` on the plane: Dijkstra (1959) with Dial's (1969) buckets, costs in hundredths of a
+cell. Here a bucket is a list through the cells themselves, so a wave takes five numbers a cell however
+often costs fall. A step to one of 26 neighbours costs its length times the mean price of both cells.
+Corners may be cut: what divides rooms is at least two cells thick where the clearance is kept.
+
+A wave is kept while cells change (`forget`): up to the least cost that a change can touch it stands.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numba as nb
+import numpy as np
+
+from uavexp.arrays import Float, Int, Int32, UInt8
+from uavexp.memory import blank
+
+FAR = 2**31 - 1
+UNIT = 100  # a straight step between cells of the least price
+MOST_PRICE = 5.0
+_BUCKETS = 1024  # > the longest step
+_RING = _BUCKETS - 1
+_NOW, _WAITING, _LEFT = 0, 1, 2
+
+
+class Wave(NamedTuple):
+    """Costs from one cell; those below `now` are final."""
+
+    cost: Int32  # (N,) of the way to each cell; FAR where the wave has not been
+    head: Int32  # (1024,) first cell of each bucket, -1: none
+    following: Int32  # (N,) next cell of its bucket
+    before: Int32  # (N,) the one before it, -1: it is the first
+    order: Int32  # (N,) cells in the order in which the wave left them
+    clock: Int  # (3,) now, cells waiting, cells left
+
+
+class Steps(NamedTuple):
+    """The 26 steps on a grid laid flat."""
+
+    offset: Int  # (26,)
+    length: Int  # (26,) hundredths of a cell
+
+
+def new_wave(cells: int) -> Wave:
+    """A wave that has not begun; memory that it does not come to use costs nothing."""
+    cost = np.full(cells, FAR, np.int32)
+    lists = (blank(cells, np.int32) for _ in range(3))
+    return Wave(cost, np.full(_BUCKETS, -1, np.int32), *lists, np.zeros(3, np.int64))
+
+
+def steps_on(shape: tuple[int, int, int]) -> Steps:
+    """The steps on a grid of this shape (margin included)."""
+    moves = np.array([m for m in np.ndindex(3, 3, 3) if m != (1, 1, 1)]) - 1
+    length = np.floor(UNIT * np.linalg.norm(moves, axis=1) + 0.5).astype(np.int64)
+    return Steps(moves @ np.array([shape[1] * shape[2], shape[2], 1]), length)
+
+
+@nb.njit(cache=True, inline="always")
+def _enter(wave: Wave, cell: int, cost: int) -> None:
+    """Give a cell this cost, and put it into the bucket of it."""
+    slot = cost & _RING
+    first = wave.head[slot]
+    wave.cost[cell], wave.following[cell], wave.before[cell] = cost, first, -1
+    if first >= 0:
+        wave.before[first] = cell
+    wave.head[slot] = cell
+    wave.clock[_WAITING] += 1
+
+
+@nb.njit(cache=True, inline="always")
+def _remove(wave: Wave, cell: int) -> None:
+    """Take a waiting cell out of its bucket."""
+    ahead, behind = wave.before[cell], wave.following[cell]
+    if ahead >= 0:
+        wave.following[ahead] = behind
+    else:
+        wave.head[wave.cost[cell] & _RING] = behind
+    if behind >= 0:
+        wave.before[behind] = ahead
+    wave.clock[_WAITING] -= 1
+
+
+@nb.njit(cache=True)
+def _empty_buckets(wave: Wave) -> None:
+    """Take back the costs of all waiting cells."""
+    for slot in range(_BUCKETS):
+        cell = wave.head[slot]
+        while cell >= 0:
+            wave.cost[cell] = FAR
+            cell = wave.following[cell]
+        wave.head[slot] = -1
+    wave.clock[_WAITING] = 0
+
+
+@nb.njit(cache=True)
+def begin(wave: Wave, source: int) -> None:
+    """Begin at a cell, which is left even if it is not passable."""
+    for cell in wave.order[: wave.clock[_LEFT]]:
+        wave.cost[cell] = FAR
+    _empty_buckets(wave)
+    wave.clock[:] = 0
+    _enter(wave, source, 0)
+
+
+@nb.njit(cache=True)
+def reach(wave: Wave, kind: UInt8, steps: Steps, price: Float, goal: int, most: int) -> int:
+    """Cost of the way to a cell; FAR when there is none, or none of a cost up to `most`.
+
+    Args:
+        wave: is let spread that far.
+        kind: (N,) of each cell, margin included.
+        steps: on the grid.
+        price: (K,) of a cell of each kind, 1 to `MOST_PRICE`; 0: not passable.
+        goal: cell.
+        most: cost.
+    """
+    cost = wave.cost
+    now = wave.clock[_NOW]
+    while wave.clock[_WAITING] > 0 and now < cost[goal] and now <= most:
+        at = wave.head[now & _RING]
+        if at < 0:
+            now += 1
+            continue
+        _remove(wave, at)
+        wave.order[wave.clock[_LEFT]] = at
+        wave.clock[_LEFT] += 1
+        here = max(price[kind[at]], 1.0)
+        for n in range(steps.offset.shape[0]):
+            near = at + steps.offset[n]
+            there = price[kind[near]]
+            if there == 0.0:
+                continue
+            reached = now + int(0.5 * (here + there) * steps.length[n])
+            if reached < cost[near]:
+                if cost[near] < FAR:
+                    _remove(wave, near)
+                _enter(wave, near, reached)
+    wave.clock[_NOW] = now
+    return int(cost[goal]) if cost[goal] <= min(now, most) else FAR
+
+
+@nb.njit(cache=True)
+def forget(wave: Wave, kind: UInt8, steps: Steps, price: Float, level: int) -> None:
+    """Take back every cost above the level and go on from there; what costs less must hold as it is.
+
+    Args:
+        wave: is changed.
+        kind: (N,) of each cell, as it is now.
+        steps: on the grid.
+        price: (K,) of each kind.
+        level: cost, >= 0; the source stays in any case.
+    """
+    order, cost, clock = wave.order, wave.cost, wave.clock
+    if clock[_LEFT] == 0:  # the source is still waiting, and has reached nothing
+        return
+    _empty_buckets(wave)
+    while clock[_LEFT] > 1 and cost[order[clock[_LEFT] - 1]] > level:
+        clock[_LEFT] -= 1
+        cost[order[clock[_LEFT]]] = FAR
+    clock[_NOW] = cost[order[clock[_LEFT] - 1]]
+    first = clock[_LEFT]
+    longest = int(MOST_PRICE * 1.7321 * UNIT) + 1
+    while first > 0 and cost[order[first - 1]] >= clock[_NOW] - longest:
+        first -= 1
+    for at in order[first : clock[_LEFT]]:  # from these, steps lead beyond the level
+        here = max(price[kind[at]], 1.0)
+        for n in range(steps.offset.shape[0]):
+            near = at + steps.offset[n]
+            there = price[kind[near]]
+            reached = cost[at] + int(0.5 * (here + there) * steps.length[n])
+            if there > 0.0 and reached < cost[near]:
+                if cost[near] < FAR:
+                    _remove(wave, near)
+                _enter(wave, near, reached)
+
+
+@nb.njit(cache=True)
+def least_change(wave: Wave, steps: Steps, cells: Int) -> int:
+    """The cost up to which a wave stands after these cells (C,) have changed their kind."""
+    level = FAR
+    for cell in cells:
+        level = min(level, wave.cost[cell] - 1)
+        for n in range(steps.offset.shape[0]):
+            level = min(level, wave.cost[cell + steps.offset[n]])
+    return int(level)
