@@ -28,10 +28,11 @@ import numpy as np
 
 from uavexp.arrays import Bool, Float, Int
 from uavexp.errors import require
-from uavexp.explorer.volume.cells import OPEN, Cells
-from uavexp.explorer.volume.route import Ways
+from uavexp.explorer.volume.cells import NARROW, OPEN, Cells
+from uavexp.explorer.volume.route import ANY, WIDE, Ways, optimistic
 from uavexp.explorer.volume.viewpoints import Cluster, Viewpoints
 from uavexp.explorer.volume.views import Places, Sight
+from uavexp.explorer.volume.waves import MOST_PRICE, Prices
 from uavexp.geometry import wrap_angle, yaw_of
 from uavexp.parameters import (
     Count,
@@ -76,8 +77,10 @@ class Frontier3d:
     explores: ClassVar[bool] = True
     rate_hz: Positive = 5.0  # Hz, goal rate [ours]
     cell_m: Positive = 0.2  # m, edge of the cells in which the map is looked at [ours]
-    min_clearance_m: Positive = 0.3  # m, of the places that are flown to [ours]
-    narrow_clearance_m: NarrowClearance = 0.22  # m, of cells on ways to them; 0: min_clearance_m [ours]
+    min_clearance_m: Positive = 0.28  # m, of the places that are flown to and of ways there [ours]
+    narrow_clearance_m: NarrowClearance = (
+        0.22  # m, of ways where min_clearance_m leaves none; 0: never [ours]
+    )
     min_cluster_cells: Count = 4  # fewer joined frontier cells are ignored [ours]
     cluster_m: Positive = 1.6  # m, edge of the cubes into which frontiers are cut [ours]
     horizontal_fov_deg: Annotated[float, above(0), at_most(360)] = 90.0  # deg, of the sensor; 180 and more:
@@ -88,8 +91,10 @@ class Frontier3d:
     view_range_m: Positive = 4.5  # m, farther frontiers are not seen from a place [ours]
     unknown: Unknown = Unknown.OPTIMISTIC  # optimistic: with no frontier left, the target is flown to
     # through unknown space | conservative: it is not
-    unseen_price: Annotated[float, between(1, 5)] = 1.5  # an unseen cell counts as so many seen ones on the
-    # way to a target [ours]
+    unseen_price: Annotated[float, between(1, MOST_PRICE)] = 1.5  # an unseen cell counts as so many seen
+    # ones on the way to a target [ours]
+    unseen_climb: Annotated[float, between(1, MOST_PRICE)] = 3.0  # times that, up or down: between storeys
+    # there are floors; no cell counts as more than 5 [ours]
     covered_share: Share = 0.3  # a goal is left when so little of what it shows is still unseen [ours]
     rethink_s: Positive = 1.0  # s, a goal is compared with others after so long [ours]
     hysteresis_m: NonNegative = 1.5  # m, that another goal must be better [ours]
@@ -112,6 +117,11 @@ class Frontier3d:
             self.horizontal_fov_deg >= 180.0 or high - low < 180.0,
             f"highest_deg must be < lowest_deg + 180 for a camera, got {high}",
         )
+
+    @property
+    def _optimistic(self) -> Prices:
+        """What ways to a target cost."""
+        return optimistic(self.unseen_price, self.unseen_climb)
 
     def reset(self, flight_height_m: float, limits: Limits) -> None:
         """Begin a trial; heights are free, so the flight height counts for nothing."""
@@ -138,13 +148,26 @@ class Frontier3d:
         if choice is not None and not self._is_open(space, choice):
             choice = self._choice = None
         if fresh or choice is None or now_s - choice.made_s >= self.rethink_s - 1e-9:
-            space.ways.begin(int(space.cells.of(observation.state.position_m[None])[0]))
-            self._choice = self._target(space, observation) or self._best(space, observation)
+            self._choice = self._chosen(space, observation)
         if self._choice is None:
             return self._last_resort(observation)
         goal = self._choice.goal
         away_m = float(np.linalg.norm(goal.position_m - observation.state.position_m))
         return goal if away_m <= self.look_m else replace(goal, yaw_rad=math.nan)
+
+    def _chosen(self, space: _Space, observation: Observation) -> _Choice | None:
+        """The target if seen cells lead there, else the best place; over narrow ones if there is no other."""
+        clusters = space.viewpoints.clusters(self.looks, observation.state.position_m)
+        here = int(space.cells.of(observation.state.position_m[None])[0])
+        for known in (WIDE, ANY):
+            space.ways.begin(here, known)
+            choice = self._target(space, observation) or self._best(space, observation, clusters)
+            if choice is not None:
+                return choice
+        if not clusters or not self._aside:
+            return None
+        self._aside.pop(0)  # what was set aside is tried again before all is given up
+        return self._chosen(space, observation)
 
     def _look(self, observation: Observation) -> _Space:
         """The map in cells, up to date."""
@@ -154,7 +177,7 @@ class Frontier3d:
         changed = space.cells.update()
         target = None if target_m is None else int(space.cells.of(target_m[None])[0])
         if target != space.ways.target:
-            ways = Ways(cells=space.cells, unseen_price=self.unseen_price, target=target)
+            ways = Ways(cells=space.cells, optimistic=self._optimistic, target=target)
             space = replace(space, ways=ways)
         else:
             space.ways.note(changed)
@@ -167,7 +190,7 @@ class Frontier3d:
             raise RuntimeError("select() needs reset() first")
         map_, bounds_m = observation.field, observation.flight_bounds_m
         least_m = min(self.narrow_clearance_m or self.min_clearance_m, self.min_clearance_m)
-        cells = Cells(map_, bounds_m, self.cell_m, least_m)
+        cells = Cells(map_, bounds_m, self.cell_m, (self.min_clearance_m, least_m))
         places = Places(
             map_.state, map_.distance, map_.origin_m, map_.voxel_size_m, cells.cell_m,
             self.min_clearance_m, self._limits.body_radius_m, bounds_m[0], bounds_m[1],
@@ -179,23 +202,31 @@ class Frontier3d:
         return _Space(
             cells=cells,
             viewpoints=Viewpoints(cells, sight, places, self.min_cluster_cells, most),
-            ways=Ways(cells=cells, unseen_price=self.unseen_price),
+            ways=Ways(cells=cells, optimistic=self._optimistic),
         )
 
     def _count_looks(self, space: _Space, observation: Observation) -> None:
-        """After a while at the goal, what it shows was looked at."""
-        choice, state = self._choice, observation.state
-        if choice is None or not len(choice.cells):
+        """After a while at the goal, what it shows was looked at; where a plan ended elsewhere, it failed."""
+        choice, now_s, state = self._choice, observation.time_s, observation.state
+        if choice is None or choice.goal.is_target:
             return
         away_m = float(np.linalg.norm(choice.goal.position_m - state.position_m))
         turn = float(wrap_angle(choice.goal.yaw_rad - yaw_of(state.quaternion_wxyz)))
-        if away_m > _ARRIVED_M or abs(turn) > _ARRIVED_RAD:  # a sensor all around has no yaw
+        there = away_m <= _ARRIVED_M and not abs(turn) > _ARRIVED_RAD  # a sensor all around has no yaw
+        trajectory = observation.trajectory
+        ended = trajectory is not None and now_s >= max(trajectory.end_s, choice.made_s + _DWELL_S)
+        if not there and not (ended and away_m > _ARRIVED_M):
             self._there_since_s = math.inf
             return
-        self._there_since_s = min(self._there_since_s, observation.time_s)
-        if observation.time_s - self._there_since_s >= _DWELL_S - 1e-9:
+        self._there_since_s = min(self._there_since_s, now_s)
+        if now_s - self._there_since_s < _DWELL_S - 1e-9:
+            return
+        if there:
             space.cells.looked[choice.cells] += 1
-            self._choice, self._there_since_s = None, math.inf
+            self._choice = None
+        else:
+            self.reject(choice.goal.position_m, now_s)
+        self._there_since_s = math.inf
 
     def _is_open(self, space: _Space, choice: _Choice) -> bool:
         """Whether a goal is still one: not set aside, and it has much to show from a place that is one."""
@@ -212,7 +243,7 @@ class Frontier3d:
         target_m, cell = observation.target_m, space.ways.target
         if target_m is None or cell is None or self._aside_of(target_m[None])[0]:
             return None
-        if space.cells.kind[cell] != OPEN or not math.isfinite(space.ways.there_m(cell)):
+        if space.cells.kind[cell] not in (OPEN, NARROW) or not math.isfinite(space.ways.there_m(cell)):
             return None
         goal = Goal(position_m=target_m, is_target=True, score=-space.ways.there_m(cell))
         return _Choice(goal=goal, cells=np.zeros(0, np.int64), made_s=observation.time_s)
@@ -224,17 +255,10 @@ class Frontier3d:
             return None
         return Goal(position_m=target_m, is_target=True, score=-math.inf)
 
-    def _best(self, space: _Space, observation: Observation) -> _Choice | None:
+    def _best(self, space: _Space, observation: Observation, clusters: list[Cluster]) -> _Choice | None:
         """The place to go to first."""
-        here_m = observation.state.position_m
-        found = [
-            (cluster, *eye)
-            for cluster in space.viewpoints.clusters(self.looks, here_m)
-            if (eye := self._nearest_eye(space, cluster)) is not None
-        ]
-        if not found and self._aside:  # what was set aside is tried again before all is given up
-            self._aside.pop(0)
-            return self._best(space, observation)
+        nearest = ((cluster, self._nearest_eye(space, cluster)) for cluster in clusters)
+        found = [(cluster, *eye) for cluster, eye in nearest if eye is not None]
         if not found:
             return None
         eyes = np.array([eye for _, eye, _ in found])
@@ -255,11 +279,11 @@ class Frontier3d:
             return replace(kept, made_s=observation.time_s)
         if not math.isfinite(cost_m[first]):
             return None
-        cluster, eye = found[first][0], int(eyes[first])
-        yaw_rad = math.nan if self.horizontal_fov_deg >= 360.0 else float(cluster.yaws_rad[eye])
-        shown = space.viewpoints.shown(cluster.eyes_m[eye], float(cluster.yaws_rad[eye]), cluster.cells)
+        cluster, number = found[first][0], int(eyes[first])
+        yaw_rad = math.nan if self.horizontal_fov_deg >= 360.0 else float(cluster.yaws_rad[number])
+        shown = space.viewpoints.shown(cluster.eyes_m[number], float(cluster.yaws_rad[number]), cluster.cells)
         goal = Goal(
-            position_m=cluster.eyes_m[eye], is_target=False, score=-float(cost_m[first]), yaw_rad=yaw_rad
+            position_m=cluster.eyes_m[number], is_target=False, score=-float(cost_m[first]), yaw_rad=yaw_rad
         )
         return _Choice(goal=goal, cells=shown, made_s=observation.time_s)
 

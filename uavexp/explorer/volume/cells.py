@@ -15,13 +15,14 @@ from uavexp.arrays import Bool, Float, Float32, Int, Int32, UInt8
 from uavexp.explorer.volume.waves import Steps, steps_on
 from uavexp.field import TILE, UNKNOWN, DistanceField
 
-CLOSED, UNSEEN, OPEN = 0, 1, 2  # kinds; closed: outside, or too near to what is mapped
+# kinds; closed: outside, or too near to what is mapped; narrow: only the lesser clearance is kept
+CLOSED, UNSEEN, OPEN, NARROW_UNSEEN, NARROW = 0, 1, 2, 3, 4
 
 
 @nb.njit(cache=True)
 def _pool(
-    distance: Float32, state: UInt8, size: int, tiles: Int, inside: Int, clearance_m: float, kind: UInt8,
-    wanted: Bool, changed: Int32,
+    distance: Float32, state: UInt8, size: int, tiles: Int, inside: Int, clearance_m: tuple[float, float],
+    kind: UInt8, wanted: Bool, changed: Int32,
 ) -> int:  # fmt: skip
     """Make the cells of tiles (T, 2) of columns anew; returns how many have changed their kind.
 
@@ -31,7 +32,7 @@ def _pool(
         size: voxels along a cell's edge.
         tiles: of `DistanceField.changed`.
         inside: (2, 3) first cell within the flight bounds, and the one behind the last.
-        clearance_m: that some voxel of a passable cell exceeds.
+        clearance_m: that some voxel of a passable cell exceeds, and the lesser one of a narrow cell.
         kind: (I, J, K) margin included, is written.
         wanted: the same.
         changed: filled with the flat cells whose kind has changed.
@@ -50,7 +51,12 @@ def _pool(
                             for z in range(k * size, min(k * size + size, nz)):
                                 best = max(best, distance[x, y, z])
                                 unseen += state[x, y, z] == UNKNOWN
-                    now = CLOSED if best <= clearance_m else UNSEEN if unseen > few else OPEN
+                    if best > clearance_m[0]:
+                        now = UNSEEN if unseen > few else OPEN
+                    elif best > clearance_m[1]:
+                        now = NARROW_UNSEEN if unseen > few else NARROW
+                    else:
+                        now = CLOSED
                     wanted[i + 1, j + 1, k + 1] = now == UNSEEN and unseen >= half
                     if kind[i + 1, j + 1, k + 1] != now:
                         kind[i + 1, j + 1, k + 1] = now
@@ -75,7 +81,7 @@ def _frontier(kind: UInt8, wanted: Bool, looked: UInt8, enough: int, faces: Int)
         if not wanted[at] or looked[at] >= enough:
             continue
         for offset in faces:
-            if kind[at + offset] == OPEN:
+            if kind[at + offset] == OPEN or kind[at + offset] == NARROW:
                 found[count] = at
                 count += 1
                 break
@@ -89,21 +95,23 @@ class Cells:
         field: the map.
         bounds_m: (2, 3) of the flight.
         cell_m: edge of a cell; the nearest whole number of voxels is taken.
-        clearance_m: that the body's centre keeps.
+        clearance_m: that the body's centre keeps, and the lesser one that it keeps where it must.
 
     Attributes:
-        kind: (N,) CLOSED, UNSEEN or OPEN, flat, margin included.
+        kind: (N,) of each cell, flat, margin included.
         wanted: (N,) whether most of it was not seen.
         looked: (N,) how often it was looked at and not seen.
         steps: on the grid.
         shape: of the grid, margin included.
     """
 
-    def __init__(self, field: DistanceField, bounds_m: Float, cell_m: float, clearance_m: float) -> None:
+    def __init__(
+        self, field: DistanceField, bounds_m: Float, cell_m: float, clearance_m: tuple[float, float]
+    ) -> None:
         self.field = field
         self.size = max(1, round(cell_m / field.voxel_size_m))
         self.cell_m = self.size * field.voxel_size_m
-        self.clearance_m = clearance_m
+        self._clearance_m = clearance_m
         count = [-(-n // self.size) + 2 for n in field.state.shape]
         self.shape = (count[0], count[1], count[2])
         self.kind: UInt8 = np.zeros(int(np.prod(count)), np.uint8)
@@ -127,7 +135,7 @@ class Cells:
         self._seen = now.copy()
         shaped = self.kind.reshape(self.shape), self.wanted.reshape(self.shape)
         count = _pool(
-            field.distance, field.state, self.size, tiles, self._inside, self.clearance_m, *shaped,
+            field.distance, field.state, self.size, tiles, self._inside, self._clearance_m, *shaped,
             self._changes,
         )  # fmt: skip
         return self._changes[:count].copy()

@@ -6,16 +6,42 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from uavexp.arrays import Float, Int
+from uavexp.arrays import Float, Int, Int32
 from uavexp.explorer.volume.cells import Cells
-from uavexp.explorer.volume.waves import FAR, MOST_PRICE, UNIT, Wave, begin, forget, least_change, new_wave, reach
+from uavexp.explorer.volume.waves import (
+    FAR,
+    UNIT,
+    Prices,
+    Wave,
+    begin,
+    forget,
+    least_change,
+    new_wave,
+    reach,
+)
 from uavexp.inspection.tour import open_tour
 
-_KNOWN = np.array([0.0, 0.0, 1.0])  # prices of the kinds of cells: ways lead over free ones alone
 _NEAREST = 6  # places to which ways are sought; those to farther ones lead through these
 _KICKS_PER_PLACE = 10
 _PLACES = 60  # that a tour visits, the nearest; farther ones wait for the next
 _MEMORY = 20_000  # pairs
+_NARROW_PRICE = 3.0
+# prices of the kinds of cells on ways over what was seen, without narrow places and with them
+WIDE = Prices(np.array([0.0, 0.0, 1.0, 0.0, 0.0]), np.ones(5))
+ANY = Prices(np.array([0.0, 0.0, 1.0, 0.0, _NARROW_PRICE]), np.ones(5))
+
+
+def optimistic(unseen: float, climb: float) -> Prices:
+    """Prices on ways that may lead over what was not seen.
+
+    Args:
+        unseen: of an unseen cell.
+        climb: how much dearer steps up or down are there.
+    """
+    narrow = max(unseen, _NARROW_PRICE)
+    return Prices(
+        np.array([0.0, unseen, 1.0, narrow, _NARROW_PRICE]), np.array([1.0, climb, 1.0, climb, 1.0])
+    )
 
 
 def _metres(cost: int, cell_m: float) -> float:
@@ -27,9 +53,10 @@ class Ways:
     """Lengths of ways over the cells of a map, from the vehicle, to the target, and between places."""
 
     cells: Cells
-    unseen_price: float  # of a cell that was not seen, on ways to the target
+    optimistic: Prices = field(repr=False)  # of ways to the target
     target: int | None = None  # cell
     _vehicle: int = -1
+    _known: Prices = WIDE
     _own: Wave = field(init=False, repr=False)
     _other: Wave = field(init=False, repr=False)
     _beyond: Wave = field(init=False, repr=False)
@@ -41,36 +68,32 @@ class Ways:
         if self.target is not None:
             begin(self._beyond, self.target)
 
-    @property
-    def _optimistic(self) -> Float:
-        return np.array([0.0, min(self.unseen_price, MOST_PRICE), 1.0])
-
-    def note(self, changed: Int) -> None:
+    def note(self, changed: Int32) -> None:
         """Take note of cells (C,) that have changed their kind."""
         cells = self.cells
         if self.target is not None and len(changed):
             level = least_change(self._beyond, cells.steps, changed)
             if level < FAR - 1:
-                forget(self._beyond, cells.kind, cells.steps, self._optimistic, level)
+                forget(self._beyond, cells.kind, cells.steps, self.optimistic, level)
 
-    def begin(self, vehicle: int) -> None:
-        """Ask for ways from this cell."""
-        self._vehicle = vehicle
+    def begin(self, vehicle: int, known: Prices) -> None:
+        """Ask for ways from this cell over what was seen, at these prices."""
+        self._vehicle, self._known = vehicle, known
         begin(self._own, vehicle)
 
     def there_m(self, cell: int) -> float:
-        """Length of the way from the vehicle over free cells; inf when there is none."""
+        """Length of the way from the vehicle over what was seen; inf when there is none."""
         if cell == self._vehicle:
             return 0.0
         cells = self.cells
-        return _metres(reach(self._own, cells.kind, cells.steps, _KNOWN, cell, FAR), cells.cell_m)
+        return _metres(reach(self._own, cells.kind, cells.steps, self._known, cell, FAR), cells.cell_m)
 
     def beyond_m(self, cell: int) -> float:
         """Length of the way to the target, unseen cells being passable at their price; 0 without a target."""
         if self.target is None:
             return 0.0
         cells = self.cells
-        cost = reach(self._beyond, cells.kind, cells.steps, self._optimistic, cell, FAR)
+        cost = reach(self._beyond, cells.kind, cells.steps, self.optimistic, cell, FAR)
         return _metres(cost, cells.cell_m)
 
     def tour(self, places: Int, first_m: Float, there_m: Float) -> Int:
@@ -113,5 +136,5 @@ class Ways:
         begin(self._other, start)
         for end, bound_m in zip(ends.tolist(), most_m.tolist(), strict=True):
             most = int(bound_m / cells.cell_m * UNIT) + 1
-            cost = reach(self._other, cells.kind, cells.steps, _KNOWN, end, most) if end != start else 0
+            cost = reach(self._other, cells.kind, cells.steps, self._known, end, most) if end != start else 0
             self._between[start, end] = self._between[end, start] = _metres(cost, cells.cell_m)

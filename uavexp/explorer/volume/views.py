@@ -140,7 +140,7 @@ def look_from(places: Places, sight: Sight, eyes: Float, cells_m: Float) -> tupl
 
 
 def offsets_around() -> Float:
-    """Offsets (E, 3), m, of places from which a cluster may be seen, on upright cylinders around its middle."""
+    """Offsets (E, 3), m, of places to look from: on upright cylinders around a cluster's middle."""
     turns_rad = 2.0 * math.pi * np.arange(_TURNS) / _TURNS
     level = [
         (radius_m * math.cos(turn), radius_m * math.sin(turn)) for radius_m in _RADII_M for turn in turns_rad

@@ -42,20 +42,29 @@ class Steps(NamedTuple):
 
     offset: Int  # (26,)
     length: Int  # (26,) hundredths of a cell
+    climbs: Int  # (26,) 1: up or down, 0: level
+
+
+class Prices(NamedTuple):
+    """What ways cost by the kinds of their cells; no step costs more than `MOST_PRICE` times its length."""
+
+    cell: Float  # (K,) of a cell of each kind, 1 and more; 0: not passable
+    climb: Float  # (K,) factor on steps up or down to or from it
 
 
 def new_wave(cells: int) -> Wave:
     """A wave that has not begun; memory that it does not come to use costs nothing."""
     cost = np.full(cells, FAR, np.int32)
-    lists = (blank(cells, np.int32) for _ in range(3))
-    return Wave(cost, np.full(_BUCKETS, -1, np.int32), *lists, np.zeros(3, np.int64))
+    following, before, order = (blank(cells, np.int32) for _ in range(3))
+    return Wave(cost, np.full(_BUCKETS, -1, np.int32), following, before, order, np.zeros(3, np.int64))
 
 
 def steps_on(shape: tuple[int, int, int]) -> Steps:
     """The steps on a grid of this shape (margin included)."""
     moves = np.array([m for m in np.ndindex(3, 3, 3) if m != (1, 1, 1)]) - 1
     length = np.floor(UNIT * np.linalg.norm(moves, axis=1) + 0.5).astype(np.int64)
-    return Steps(moves @ np.array([shape[1] * shape[2], shape[2], 1]), length)
+    offset = moves @ np.array([shape[1] * shape[2], shape[2], 1])
+    return Steps(offset, length, np.abs(moves[:, 2]))
 
 
 @nb.njit(cache=True, inline="always")
@@ -105,15 +114,38 @@ def begin(wave: Wave, source: int) -> None:
     _enter(wave, source, 0)
 
 
+@nb.njit(cache=True, inline="always")
+def _step_cost(steps: Steps, n: int, price: Prices, here: int, there: int) -> int:
+    """What step number n costs between cells of these kinds; the first may be the source."""
+    mean = 0.5 * (max(price.cell[here], 1.0) + price.cell[there])
+    climb = max(price.climb[here], price.climb[there]) if steps.climbs[n] else 1.0
+    return int(min(mean * climb, MOST_PRICE) * steps.length[n])
+
+
+@nb.njit(cache=True, inline="always")
+def _spread(wave: Wave, kind: UInt8, steps: Steps, price: Prices, at: int) -> None:
+    """Enter the neighbours of a cell that are reached at less cost over it."""
+    cost = wave.cost
+    for n in range(steps.offset.shape[0]):
+        near = at + steps.offset[n]
+        if price.cell[kind[near]] == 0.0:
+            continue
+        reached = cost[at] + _step_cost(steps, n, price, kind[at], kind[near])
+        if reached < cost[near]:
+            if cost[near] < FAR:
+                _remove(wave, near)
+            _enter(wave, near, reached)
+
+
 @nb.njit(cache=True)
-def reach(wave: Wave, kind: UInt8, steps: Steps, price: Float, goal: int, most: int) -> int:
+def reach(wave: Wave, kind: UInt8, steps: Steps, price: Prices, goal: int, most: int) -> int:
     """Cost of the way to a cell; FAR when there is none, or none of a cost up to `most`.
 
     Args:
         wave: is let spread that far.
         kind: (N,) of each cell, margin included.
         steps: on the grid.
-        price: (K,) of a cell of each kind, 1 to `MOST_PRICE`; 0: not passable.
+        price: of each kind.
         goal: cell.
         most: cost.
     """
@@ -127,31 +159,21 @@ def reach(wave: Wave, kind: UInt8, steps: Steps, price: Float, goal: int, most: 
         _remove(wave, at)
         wave.order[wave.clock[_LEFT]] = at
         wave.clock[_LEFT] += 1
-        here = max(price[kind[at]], 1.0)
-        for n in range(steps.offset.shape[0]):
-            near = at + steps.offset[n]
-            there = price[kind[near]]
-            if there == 0.0:
-                continue
-            reached = now + int(0.5 * (here + there) * steps.length[n])
-            if reached < cost[near]:
-                if cost[near] < FAR:
-                    _remove(wave, near)
-                _enter(wave, near, reached)
+        _spread(wave, kind, steps, price, at)
     wave.clock[_NOW] = now
     return int(cost[goal]) if cost[goal] <= min(now, most) else FAR
 
 
 @nb.njit(cache=True)
-def forget(wave: Wave, kind: UInt8, steps: Steps, price: Float, level: int) -> None:
+def forget(wave: Wave, kind: UInt8, steps: Steps, price: Prices, level: int) -> None:
     """Take back every cost above the level and go on from there; what costs less must hold as it is.
 
     Args:
         wave: is changed.
         kind: (N,) of each cell, as it is now.
         steps: on the grid.
-        price: (K,) of each kind.
-        level: cost, >= 0; the source stays in any case.
+        price: of each kind.
+        level: cost; the source stays in any case.
     """
     order, cost, clock = wave.order, wave.cost, wave.clock
     if clock[_LEFT] == 0:  # the source is still waiting, and has reached nothing
@@ -166,19 +188,11 @@ def forget(wave: Wave, kind: UInt8, steps: Steps, price: Float, level: int) -> N
     while first > 0 and cost[order[first - 1]] >= clock[_NOW] - longest:
         first -= 1
     for at in order[first : clock[_LEFT]]:  # from these, steps lead beyond the level
-        here = max(price[kind[at]], 1.0)
-        for n in range(steps.offset.shape[0]):
-            near = at + steps.offset[n]
-            there = price[kind[near]]
-            reached = cost[at] + int(0.5 * (here + there) * steps.length[n])
-            if there > 0.0 and reached < cost[near]:
-                if cost[near] < FAR:
-                    _remove(wave, near)
-                _enter(wave, near, reached)
+        _spread(wave, kind, steps, price, at)
 
 
 @nb.njit(cache=True)
-def least_change(wave: Wave, steps: Steps, cells: Int) -> int:
+def least_change(wave: Wave, steps: Steps, cells: Int32) -> int:
     """The cost up to which a wave stands after these cells (C,) have changed their kind."""
     level = FAR
     for cell in cells:

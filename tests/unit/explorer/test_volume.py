@@ -1,0 +1,142 @@
+"""Waves, clusters and cells of space: scipy's costs, still after cells have changed; nothing lost."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy import ndimage
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import dijkstra
+
+from uavexp.arrays import Float
+from uavexp.check.fields import empty, field_from
+from uavexp.explorer.volume.cells import CLOSED, NARROW, OPEN, UNSEEN, Cells
+from uavexp.explorer.volume.clusters import clusters_of
+from uavexp.explorer.volume.route import ANY, WIDE, optimistic
+from uavexp.explorer.volume.waves import (
+    FAR,
+    Prices,
+    begin,
+    forget,
+    least_change,
+    new_wave,
+    reach,
+    steps_on,
+)
+
+SHAPE = (9, 8, 6)
+STEPS = steps_on(SHAPE)
+PRICES = optimistic(1.5, 3.0)
+
+
+def random_kinds(rng: np.random.Generator) -> np.ndarray:
+    kind = rng.choice(5, SHAPE, p=[0.4, 0.2, 0.2, 0.1, 0.1]).astype(np.uint8)
+    inner = np.zeros(SHAPE, dtype=bool)
+    inner[1:-1, 1:-1, 1:-1] = True
+    return np.where(inner, kind, CLOSED).astype(np.uint8)
+
+
+def scipy_costs(kind: np.ndarray, price: Prices, source: int) -> Float:
+    """The same graph, built edge by edge, searched by scipy."""
+    rows, cols, weights = [], [], []
+    for cell in np.ndindex(SHAPE):
+        here = int(np.ravel_multi_index(cell, SHAPE))
+        if not price.cell[kind[cell]] and here != source:
+            continue
+        for move in np.ndindex(3, 3, 3):
+            near = tuple(np.array(cell) + move - 1)
+            if move == (1, 1, 1) or min(near) < 0 or (np.array(near) >= SHAPE).any():
+                continue
+            if not price.cell[kind[near]]:
+                continue
+            mean = 0.5 * (max(price.cell[kind[cell]], 1.0) + price.cell[kind[near]])
+            climb = max(price.climb[kind[cell]], price.climb[kind[near]]) if move[2] != 1 else 1.0
+            length = math.floor(100 * math.dist(move, (1, 1, 1)) + 0.5)
+            rows.append(here)
+            cols.append(int(np.ravel_multi_index(near, SHAPE)))
+            weights.append(int(min(mean * climb, 5.0) * length))
+    size = int(np.prod(SHAPE))
+    return dijkstra(coo_array((weights, (rows, cols)), shape=(size, size)).tocsr(), indices=source)
+
+
+def asked(wave, kind: np.ndarray, price: Prices, cells: range) -> Float:
+    found = [reach(wave, kind.reshape(-1), STEPS, price, cell, FAR) for cell in cells]
+    return np.array([math.inf if cost == FAR else cost for cost in found])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_costs_equal_scipys_and_follow_every_change(seed: int) -> None:
+    rng, size = np.random.default_rng(seed), int(np.prod(SHAPE))
+    kind, wave = random_kinds(rng), new_wave(size)
+    for price in (WIDE, ANY, PRICES):
+        source = int(np.ravel_multi_index((4, 4, 3), SHAPE))
+        begin(wave, source)
+        for _ in range(25):
+            expected = scipy_costs(kind, price, source)
+            expected[price.cell[kind.reshape(-1)] == 0.0] = np.inf
+            expected[source] = 0.0
+            cells = range(size) if rng.random() < 0.3 else range(int(rng.integers(size - 20)), size, 37)
+            np.testing.assert_array_equal(asked(wave, kind, price, cells), expected[list(cells)])
+            other = np.where(rng.random(SHAPE) < 0.02, random_kinds(rng), kind)
+            changed = np.flatnonzero(other != kind).astype(np.int32)
+            kind = other
+            if len(changed):
+                level = least_change(wave, STEPS, changed)
+                if level < FAR - 1:
+                    forget(wave, kind.reshape(-1), STEPS, price, level)
+
+
+def test_no_way_that_costs_more_than_asked_for_is_found_and_it_is_later() -> None:
+    kind, wave = np.zeros(SHAPE, np.uint8), new_wave(int(np.prod(SHAPE)))
+    kind[1:-1, 1:-1, 1:-1] = OPEN
+    ends = [int(np.ravel_multi_index(cell, SHAPE)) for cell in ((1, 1, 1), (7, 1, 1))]
+    begin(wave, ends[0])
+    assert reach(wave, kind.reshape(-1), STEPS, WIDE, ends[1], 599) == FAR
+    assert reach(wave, kind.reshape(-1), STEPS, WIDE, ends[1], 600) == 600
+
+
+def test_clusters_are_scipys_parts_cut_into_cubes() -> None:
+    rng = np.random.default_rng(3)
+    shape = (20, 18, 14)
+    frontier = np.pad(rng.random(np.array(shape) - 2) < 0.05, 1)
+    cells = np.flatnonzero(frontier)
+    index = np.stack(np.unravel_index(cells, shape), axis=-1)
+    found = clusters_of(cells, index, steps_on(shape), least=4, most=5)
+    label, count = ndimage.label(frontier, np.ones((3, 3, 3)))
+    of_part = label.reshape(-1)
+    large = np.flatnonzero(np.bincount(of_part, minlength=count + 1) >= 4)[1:]
+    np.testing.assert_array_equal(np.sort(np.concatenate(found)), np.flatnonzero(np.isin(of_part, large)))
+    for members in found:
+        cube = np.stack(np.unravel_index(members, shape), axis=-1) // 5
+        assert len(np.unique(cube, axis=0)) == 1
+        assert len(np.unique(of_part[members])) == 1
+
+
+def test_cells_follow_the_voxels() -> None:
+    """Open where seen and wide, narrow between two walls, unseen behind, closed in the wall."""
+    grid = empty((4.0, 3.0, 2.0))
+    grid[20] = True  # a wall at x = 2.0 to 2.1
+    grid[20, 12:17, 5:15] = False  # with an opening of 0.5 m by 1 m
+    unknown = empty((4.0, 3.0, 2.0))
+    unknown[24:] = True
+    field = field_from(grid & ~unknown, unknown=unknown, max_distance_m=2.0)
+    bounds_m = np.array([[0.3, 0.3, 0.3], [3.7, 2.7, 1.7]])
+    cells = Cells(field, bounds_m, 0.2, (0.28, 0.15))
+    changed = cells.update()
+    at = {
+        point: int(cells.of(np.array([point]))[0])
+        for point in ((1.0, 1.5, 1.0), (2.05, 1.45, 1.0), (3.1, 1.5, 1.0), (2.05, 0.8, 1.0), (0.1, 1.5, 1.0))
+    }
+    assert [int(cells.kind[cell]) for cell in at.values()] == [OPEN, NARROW, UNSEEN, CLOSED, CLOSED]
+    assert set(np.flatnonzero(cells.kind)) == set(changed.tolist())
+    frontier = cells.frontier(1)
+    assert len(frontier)
+    assert (cells.wanted[frontier] & (cells.kind[frontier] == UNSEEN)).all()
+    x_m = cells.centre_m(frontier)[:, 0]
+    np.testing.assert_allclose(x_m, 2.5)  # the first layer that was not seen
+    cells.looked[frontier] = 1
+    assert not len(cells.frontier(1))
+    assert len(cells.frontier(2)) == len(frontier)
+    assert not len(cells.update())
