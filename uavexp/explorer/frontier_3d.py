@@ -21,18 +21,20 @@ RA-L 2021, and Zhang et al., FALCON, T-RO 2024; optimism D* Lite, Koenig and Lik
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Annotated, ClassVar
 
 import numpy as np
 
 from uavexp.arrays import Bool, Float, Int
 from uavexp.errors import require
-from uavexp.explorer.volume.cells import NARROW, OPEN, Cells
+from uavexp.explorer.volume.cells import Body, Cells
 from uavexp.explorer.volume.route import ANY, WIDE, Ways, optimistic
+from uavexp.explorer.volume.space import Candidates, Space, leg_is_done
 from uavexp.explorer.volume.viewpoints import Cluster, Viewpoints
 from uavexp.explorer.volume.views import Places, Sight
-from uavexp.explorer.volume.waves import MOST_PRICE, Prices
+from uavexp.explorer.volume.waves import MOST_PRICE
 from uavexp.geometry import wrap_angle, yaw_of
 from uavexp.parameters import (
     Count,
@@ -54,20 +56,15 @@ _SAME_M = 1.0  # a cluster whose place is so near to the goal goes on where the 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Choice:
-    """A goal, and what it is to show."""
+    """A place to go to, or the target, and the leg that leads there next."""
 
-    goal: Goal
-    cells: Int  # (C,) none of the target
+    place_m: Float  # (3,)
+    yaw_rad: float  # NaN: none
+    cells: Int  # (C,) that it is to show; none of the target
+    is_target: bool
+    score: float
+    leg_m: Float  # (3,) where the leg ends
     made_s: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Space:
-    """What is kept of one map."""
-
-    cells: Cells
-    viewpoints: Viewpoints
-    ways: Ways
 
 
 @option
@@ -105,7 +102,7 @@ class Frontier3d:
     aside_radius_m: Positive = 0.4  # m, places so near to one to which no plan led are set aside with it ...
     set_aside_s: NonNegative = 10.0  # s, ... for so long [ours]
     _limits: Limits | None = field(init=False, repr=False, default=None)
-    _space: _Space | None = field(init=False, repr=False, default=None)
+    _space: Space | None = field(init=False, repr=False, default=None)
     _choice: _Choice | None = field(init=False, repr=False, default=None)
     _aside: list[tuple[float, Float]] = field(init=False, repr=False, default_factory=list)
     _there_since_s: float = field(init=False, repr=False, default=math.inf)
@@ -117,11 +114,6 @@ class Frontier3d:
             self.horizontal_fov_deg >= 180.0 or high - low < 180.0,
             f"highest_deg must be < lowest_deg + 180 for a camera, got {high}",
         )
-
-    @property
-    def _optimistic(self) -> Prices:
-        """What ways to a target cost."""
-        return optimistic(self.unseen_price, self.unseen_climb)
 
     def reset(self, flight_height_m: float, limits: Limits) -> None:
         """Begin a trial; heights are free, so the flight height counts for nothing."""
@@ -141,27 +133,102 @@ class Frontier3d:
 
         With `fresh` a plan is about to be made, so all goals are compared.
         """
-        now_s, space = observation.time_s, self._look(observation)
+        now_s, here_m = observation.time_s, observation.state.position_m
+        space = self._on(observation)
         self._aside = [entry for entry in self._aside if entry[0] > now_s]
         self._count_looks(space, observation)
+        if self._choice is not None and not self._is_open(space, self._choice):
+            self._choice = None
         choice = self._choice
-        if choice is not None and not self._is_open(space, choice):
-            choice = self._choice = None
-        if fresh or choice is None or now_s - choice.made_s >= self.rethink_s - 1e-9:
-            self._choice = self._chosen(space, observation)
-        if self._choice is None:
-            return self._last_resort(observation)
-        goal = self._choice.goal
-        away_m = float(np.linalg.norm(goal.position_m - observation.state.position_m))
-        return goal if away_m <= self.look_m else replace(goal, yaw_rad=math.nan)
+        due = choice is None or now_s - choice.made_s >= self.rethink_s - 1e-9
+        if fresh or choice is None or due or leg_is_done(here_m, choice.leg_m, choice.place_m):
+            prices = optimistic(self.unseen_price, self.unseen_climb)
+            space = self._space = space.updated(observation.target_m, prices)
+            choice = self._choice = self._chosen(space, observation)
+        return self._last_resort(observation) if choice is None else self._goal(choice, here_m)
 
-    def _chosen(self, space: _Space, observation: Observation) -> _Choice | None:
+    def _goal(self, choice: _Choice, here_m: Float) -> Goal:
+        """The end of the leg; near to the place, the yaw is that with which it shows most."""
+        last = np.array_equal(choice.leg_m, choice.place_m)
+        near = last and float(np.linalg.norm(choice.place_m - here_m)) <= self.look_m
+        return Goal(
+            position_m=choice.leg_m,
+            is_target=choice.is_target and last,
+            score=choice.score,
+            yaw_rad=choice.yaw_rad if near else math.nan,
+        )
+
+    def _on(self, observation: Observation) -> Space:
+        """What is kept of the map, as it was when a place was chosen last."""
+        if self._space is None or self._space.cells.field is not observation.field:
+            self._space, self._choice = self._begun(observation), None
+        return self._space
+
+    def _begun(self, observation: Observation) -> Space:
+        """Nothing of this map is known yet."""
+        if self._limits is None:
+            raise RuntimeError("select() needs reset() first")
+        map_, bounds_m, limits = observation.field, observation.flight_bounds_m, self._limits
+        least_m = min(self.narrow_clearance_m or self.min_clearance_m, self.min_clearance_m)
+        body = Body(self.min_clearance_m, least_m, limits.body_radius_m, 0.5 * limits.body_size_m[2])
+        cells = Cells(map_, bounds_m, self.cell_m, body)
+        places = Places(
+            map_.state, map_.distance, map_.origin_m, map_.voxel_size_m, cells.cell_m,
+            self.min_clearance_m, limits.body_radius_m, bounds_m[0], bounds_m[1],
+        )  # fmt: skip
+        width, low, high = map(math.radians, (self.horizontal_fov_deg, self.lowest_deg, self.highest_deg))
+        sight = Sight(0.5 * width, low, high, self.view_range_m)
+        most = max(1, round(self.cluster_m / cells.cell_m))
+        return Space(
+            cells=cells,
+            viewpoints=Viewpoints(cells, sight, places, self.min_cluster_cells, most),
+            ways=Ways(cells=cells, optimistic=optimistic(self.unseen_price, self.unseen_climb)),
+            body=body,
+        )
+
+    def _count_looks(self, space: Space, observation: Observation) -> None:
+        """After a while at the place, what it shows was looked at; a plan that ended elsewhere failed."""
+        choice, now_s, state = self._choice, observation.time_s, observation.state
+        if choice is None or choice.is_target:
+            return
+        turn = float(wrap_angle(choice.yaw_rad - yaw_of(state.quaternion_wxyz)))
+        there = float(np.linalg.norm(choice.place_m - state.position_m)) <= _ARRIVED_M
+        looks = there and not abs(turn) > _ARRIVED_RAD  # a sensor all around has no yaw
+        short = float(np.linalg.norm(choice.leg_m - state.position_m)) > _ARRIVED_M
+        trajectory = observation.trajectory
+        ended = trajectory is not None and now_s >= max(trajectory.end_s, choice.made_s + _DWELL_S)
+        if not looks and not (ended and short):
+            self._there_since_s = math.inf
+            return
+        self._there_since_s = min(self._there_since_s, now_s)
+        if now_s - self._there_since_s < _DWELL_S - 1e-9:
+            return
+        self._there_since_s = math.inf
+        if looks:
+            space.cells.looked[choice.cells] += 1
+            self._choice = None
+        else:
+            self.reject(choice.leg_m, now_s)
+
+    def _is_open(self, space: Space, choice: _Choice) -> bool:
+        """Whether a choice still is one: not set aside, with much to show from a place that is one."""
+        if self._aside_of(choice.place_m[None])[0]:
+            return False
+        if choice.is_target:
+            return True
+        wanted = space.cells.still_wanted(choice.cells) & (space.cells.looked[choice.cells] < self.looks)
+        return bool(wanted.mean() > self.covered_share and space.viewpoints.is_place(choice.place_m))
+
+    def _chosen(self, space: Space, observation: Observation) -> _Choice | None:
         """The target if seen cells lead there, else the best place; over narrow ones if there is no other."""
-        clusters = space.viewpoints.clusters(self.looks, observation.state.position_m)
-        here = int(space.cells.of(observation.state.position_m[None])[0])
+        here_m, target_m = observation.state.position_m, observation.target_m
+        clusters = space.viewpoints.clusters(self.looks, here_m)
         for known in (WIDE, ANY):
-            space.ways.begin(here, known)
-            choice = self._target(space, observation) or self._best(space, observation, clusters)
+            space.ways.begin(space.cell_of(here_m), known)
+            to_target_m = space.to_target_m()
+            if target_m is not None and math.isfinite(to_target_m) and not self._aside_of(target_m[None])[0]:
+                return self._bound_for(space, observation, target_m, -to_target_m)
+            choice = self._best(space, observation, clusters)
             if choice is not None:
                 return choice
         if not clusters or not self._aside:
@@ -169,84 +236,24 @@ class Frontier3d:
         self._aside.pop(0)  # what was set aside is tried again before all is given up
         return self._chosen(space, observation)
 
-    def _look(self, observation: Observation) -> _Space:
-        """The map in cells, up to date."""
-        space, target_m = self._space, observation.target_m
-        if space is None or space.cells.field is not observation.field:
-            space = self._begin(observation)
-        changed = space.cells.update()
-        target = None if target_m is None else int(space.cells.of(target_m[None])[0])
-        if target != space.ways.target:
-            ways = Ways(cells=space.cells, optimistic=self._optimistic, target=target)
-            space = replace(space, ways=ways)
-        else:
-            space.ways.note(changed)
-        self._space = space
-        return space
-
-    def _begin(self, observation: Observation) -> _Space:
-        """Nothing of this map is known yet."""
-        if self._limits is None:
-            raise RuntimeError("select() needs reset() first")
-        map_, bounds_m = observation.field, observation.flight_bounds_m
-        least_m = min(self.narrow_clearance_m or self.min_clearance_m, self.min_clearance_m)
-        cells = Cells(map_, bounds_m, self.cell_m, (self.min_clearance_m, least_m))
-        places = Places(
-            map_.state, map_.distance, map_.origin_m, map_.voxel_size_m, cells.cell_m,
-            self.min_clearance_m, self._limits.body_radius_m, bounds_m[0], bounds_m[1],
-        )  # fmt: skip
-        width, low, high = map(math.radians, (self.horizontal_fov_deg, self.lowest_deg, self.highest_deg))
-        sight = Sight(0.5 * width, low, high, self.view_range_m)
-        most = max(1, round(self.cluster_m / cells.cell_m))
-        self._choice = None
-        return _Space(
+    def _bound_for(
+        self, space: Space, observation: Observation, place_m: Float, score: float,
+        shown: tuple[Int, float] | None = None,
+    ) -> _Choice:  # fmt: skip
+        """The choice of a place, with its cells and yaw, or of the target."""
+        before = self._choice
+        cells, yaw_rad = (np.zeros(0, np.int64), math.nan) if shown is None else shown
+        return _Choice(
+            place_m=place_m,
+            yaw_rad=yaw_rad,
             cells=cells,
-            viewpoints=Viewpoints(cells, sight, places, self.min_cluster_cells, most),
-            ways=Ways(cells=cells, optimistic=self._optimistic),
+            is_target=shown is None,
+            score=score,
+            leg_m=space.leg_m(
+                observation.state.position_m, place_m, None if before is None else before.leg_m
+            ),
+            made_s=observation.time_s,
         )
-
-    def _count_looks(self, space: _Space, observation: Observation) -> None:
-        """After a while at the goal, what it shows was looked at; where a plan ended elsewhere, it failed."""
-        choice, now_s, state = self._choice, observation.time_s, observation.state
-        if choice is None or choice.goal.is_target:
-            return
-        away_m = float(np.linalg.norm(choice.goal.position_m - state.position_m))
-        turn = float(wrap_angle(choice.goal.yaw_rad - yaw_of(state.quaternion_wxyz)))
-        there = away_m <= _ARRIVED_M and not abs(turn) > _ARRIVED_RAD  # a sensor all around has no yaw
-        trajectory = observation.trajectory
-        ended = trajectory is not None and now_s >= max(trajectory.end_s, choice.made_s + _DWELL_S)
-        if not there and not (ended and away_m > _ARRIVED_M):
-            self._there_since_s = math.inf
-            return
-        self._there_since_s = min(self._there_since_s, now_s)
-        if now_s - self._there_since_s < _DWELL_S - 1e-9:
-            return
-        if there:
-            space.cells.looked[choice.cells] += 1
-            self._choice = None
-        else:
-            self.reject(choice.goal.position_m, now_s)
-        self._there_since_s = math.inf
-
-    def _is_open(self, space: _Space, choice: _Choice) -> bool:
-        """Whether a goal is still one: not set aside, and it has much to show from a place that is one."""
-        if self._aside_of(choice.goal.position_m[None])[0]:
-            return False
-        if choice.goal.is_target:
-            return True
-        wanted = space.cells.wanted[choice.cells] & (space.cells.looked[choice.cells] < self.looks)
-        much = wanted.mean() > self.covered_share
-        return bool(much and space.viewpoints.is_place(choice.goal.position_m))
-
-    def _target(self, space: _Space, observation: Observation) -> _Choice | None:
-        """The mission's target, unless no free cells lead there."""
-        target_m, cell = observation.target_m, space.ways.target
-        if target_m is None or cell is None or self._aside_of(target_m[None])[0]:
-            return None
-        if space.cells.kind[cell] not in (OPEN, NARROW) or not math.isfinite(space.ways.there_m(cell)):
-            return None
-        goal = Goal(position_m=target_m, is_target=True, score=-space.ways.there_m(cell))
-        return _Choice(goal=goal, cells=np.zeros(0, np.int64), made_s=observation.time_s)
 
     def _last_resort(self, observation: Observation) -> Goal | None:
         """The target through unknown space when no frontier is left."""
@@ -255,50 +262,36 @@ class Frontier3d:
             return None
         return Goal(position_m=target_m, is_target=True, score=-math.inf)
 
-    def _best(self, space: _Space, observation: Observation, clusters: list[Cluster]) -> _Choice | None:
+    def _best(self, space: Space, observation: Observation, clusters: Sequence[Cluster]) -> _Choice | None:
         """The place to go to first."""
-        nearest = ((cluster, self._nearest_eye(space, cluster)) for cluster in clusters)
-        found = [(cluster, *eye) for cluster, eye in nearest if eye is not None]
-        if not found:
+        here_m, kept = observation.state.position_m, self._choice
+        found = space.candidates(clusters, self._aside_of, here_m, self.hysteresis_m + self.turn_m)
+        if not found.clusters:
             return None
-        eyes = np.array([eye for _, eye, _ in found])
-        eyes_m = np.stack([cluster.eyes_m[eye] for cluster, eye, _ in found])
-        there_m = np.array([there_m for _, _, there_m in found])
-        cost_m = there_m + self._turning_m(observation, eyes_m)
-        kept = self._choice
-        if kept is not None:
-            going_on = np.linalg.norm(eyes_m - kept.goal.position_m, axis=1) < _SAME_M
-            cost_m = cost_m - self.hysteresis_m * going_on
+        cost_m = found.there_m + self._turning_m(observation, found.eyes_m)
+        going_on = np.zeros(len(cost_m), dtype=np.bool_)
+        if kept is not None and not kept.is_target:
+            going_on = np.linalg.norm(found.eyes_m - kept.place_m, axis=1) < _SAME_M
+        cost_m = cost_m - self.hysteresis_m * going_on
         if space.ways.target is None:
-            nodes = np.array([cluster.eyes[eye] for cluster, eye, _ in found])
-            first = int(space.ways.tour(nodes, np.maximum(cost_m, 0.0), there_m)[0])
+            first = int(space.ways.tour(found.cells, np.maximum(cost_m, 0.0), found.there_m)[0])
         else:
-            cost_m = cost_m + np.array([self._onward_m(space, cluster, eye) for cluster, eye, _ in found])
+            cost_m = cost_m + found.onward_m
             first = int(np.argmin(cost_m))
-        if kept is not None and going_on[first]:
-            return replace(kept, made_s=observation.time_s)
         if not math.isfinite(cost_m[first]):
             return None
-        cluster, number = found[first][0], int(eyes[first])
-        yaw_rad = math.nan if self.horizontal_fov_deg >= 360.0 else float(cluster.yaws_rad[number])
-        shown = space.viewpoints.shown(cluster.eyes_m[number], float(cluster.yaws_rad[number]), cluster.cells)
-        goal = Goal(
-            position_m=cluster.eyes_m[number], is_target=False, score=-float(cost_m[first]), yaw_rad=yaw_rad
-        )
-        return _Choice(goal=goal, cells=shown, made_s=observation.time_s)
+        if kept is not None and going_on[first]:
+            place_m, shown = kept.place_m, (kept.cells, kept.yaw_rad)
+        else:
+            place_m, shown = found.eyes_m[first], self._shown(space, found, first)
+        return self._bound_for(space, observation, place_m, -float(cost_m[first]), shown)
 
-    def _nearest_eye(self, space: _Space, cluster: Cluster) -> tuple[int, float] | None:
-        """Number of the place of a cluster that is nearest to the vehicle, and the way there, m."""
-        free = np.flatnonzero(~self._aside_of(cluster.eyes_m))
-        there_m = np.array([space.ways.there_m(int(cell)) for cell in cluster.eyes[free]])
-        if not np.isfinite(there_m).any():
-            return None
-        return int(free[np.argmin(there_m)]), float(there_m.min())
-
-    def _onward_m(self, space: _Space, cluster: Cluster, eye: int) -> float:
-        """From a place to what it shows and on to the target."""
-        middle_m = space.cells.centre_m(np.array([cluster.middle]))[0]
-        return float(np.linalg.norm(middle_m - cluster.eyes_m[eye])) + space.ways.beyond_m(cluster.middle)
+    def _shown(self, space: Space, found: Candidates, first: int) -> tuple[Int, float]:
+        """Cells that a place shows, and the yaw with which it does; NaN for a sensor all around."""
+        cluster, eye_m = found.clusters[first], found.eyes_m[first]
+        yaw_rad = float(cluster.yaws_rad[found.eye[first]])
+        cells = space.viewpoints.shown(eye_m, yaw_rad, cluster.cells)
+        return cells, math.nan if self.horizontal_fov_deg >= 360.0 else yaw_rad
 
     def _turning_m(self, observation: Observation, points_m: Float) -> Float:
         """What it costs in flight to turn towards points (N, 3)."""

@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from uavexp.arrays import Float
 from uavexp.check.fields import empty, field_from
-from uavexp.explorer.volume.cells import CLOSED, NARROW, OPEN, UNSEEN, Cells
+from uavexp.explorer.volume.cells import CLOSED, EDGE, NARROW, OPEN, UNSEEN, Body, Cells
 from uavexp.explorer.volume.clusters import clusters_of
 from uavexp.explorer.volume.route import ANY, WIDE, optimistic
 from uavexp.explorer.volume.waves import (
@@ -32,7 +32,7 @@ PRICES = optimistic(1.5, 3.0)
 
 
 def random_kinds(rng: np.random.Generator) -> np.ndarray:
-    kind = rng.choice(5, SHAPE, p=[0.4, 0.2, 0.2, 0.1, 0.1]).astype(np.uint8)
+    kind = rng.choice(6, SHAPE, p=[0.4, 0.2, 0.1, 0.1, 0.1, 0.1]).astype(np.uint8)
     inner = np.zeros(SHAPE, dtype=bool)
     inner[1:-1, 1:-1, 1:-1] = True
     return np.where(inner, kind, CLOSED).astype(np.uint8)
@@ -103,7 +103,7 @@ def test_clusters_are_scipys_parts_cut_into_cubes() -> None:
     frontier = np.pad(rng.random(np.array(shape) - 2) < 0.05, 1)
     cells = np.flatnonzero(frontier)
     index = np.stack(np.unravel_index(cells, shape), axis=-1)
-    found = clusters_of(cells, index, steps_on(shape), least=4, most=5)
+    found = clusters_of(cells, index, steps_on(shape), np.zeros(frontier.size, np.int32), least=4, most=5)
     label, count = ndimage.label(frontier, np.ones((3, 3, 3)))
     of_part = label.reshape(-1)
     large = np.flatnonzero(np.bincount(of_part, minlength=count + 1) >= 4)[1:]
@@ -123,19 +123,26 @@ def test_cells_follow_the_voxels() -> None:
     unknown[24:] = True
     field = field_from(grid & ~unknown, unknown=unknown, max_distance_m=2.0)
     bounds_m = np.array([[0.3, 0.3, 0.3], [3.7, 2.7, 1.7]])
-    cells = Cells(field, bounds_m, 0.2, (0.28, 0.15))
+    cells = Cells(field, bounds_m, 0.2, Body(0.28, 0.15, 0.2, 0.05))
     changed = cells.update()
     at = {
         point: int(cells.of(np.array([point]))[0])
-        for point in ((1.0, 1.5, 1.0), (2.05, 1.45, 1.0), (3.1, 1.5, 1.0), (2.05, 0.8, 1.0), (0.1, 1.5, 1.0))
-    }
-    assert [int(cells.kind[cell]) for cell in at.values()] == [OPEN, NARROW, UNSEEN, CLOSED, CLOSED]
+        for point in (
+            (1.0, 1.5, 1.0), (2.05, 1.45, 1.0), (2.3, 1.5, 1.0), (3.1, 1.5, 1.0),
+            (2.05, 0.8, 1.0), (0.1, 1.5, 1.0),
+        )
+    }  # fmt: skip
+    kinds = [OPEN, NARROW, EDGE, UNSEEN, CLOSED, CLOSED]
+    assert [int(cells.kind[cell]) for cell in at.values()] == kinds
     assert set(np.flatnonzero(cells.kind)) == set(changed.tolist())
     frontier = cells.frontier(1)
     assert len(frontier)
     assert (cells.wanted[frontier] & (cells.kind[frontier] == UNSEEN)).all()
     x_m = cells.centre_m(frontier)[:, 0]
     np.testing.assert_allclose(x_m, 2.5)  # the first layer that was not seen
+    np.testing.assert_array_equal(
+        cells.still_wanted(np.flatnonzero(cells.kind)), cells.wanted[cells.kind > 0]
+    )
     cells.looked[frontier] = 1
     assert not len(cells.frontier(1))
     assert len(cells.frontier(2)) == len(frontier)

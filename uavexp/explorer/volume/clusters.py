@@ -5,13 +5,18 @@ from __future__ import annotations
 import numba as nb
 import numpy as np
 
-from uavexp.arrays import Int
+from uavexp.arrays import Int, Int32
 from uavexp.explorer.volume.waves import Steps
 
 
 @nb.njit(cache=True)
-def _parts(cells: Int, steps: Steps) -> Int:
-    """Number (F,) of the part of 26-connected cells (F,), ascending, that each belongs to."""
+def _parts(cells: Int, steps: Steps, number: Int32) -> Int:
+    """Number (F,) of the part of 26-connected cells (F,), ascending, that each belongs to.
+
+    `number` (N,) is all zero, and is left so.
+    """
+    for n in range(cells.shape[0]):
+        number[cells[n]] = n + 1
     part = np.full(cells.shape[0], -1, dtype=np.int64)
     stack = np.empty(cells.shape[0], dtype=np.int64)
     count = 0
@@ -23,21 +28,24 @@ def _parts(cells: Int, steps: Steps) -> Int:
             waiting -= 1
             here = cells[stack[waiting]]
             for offset in steps.offset:
-                near = np.searchsorted(cells, here + offset)
-                if near < cells.shape[0] and cells[near] == here + offset and part[near] < 0:
+                near = number[here + offset] - 1
+                if near >= 0 and part[near] < 0:
                     part[near], stack[waiting] = count, near
                     waiting += 1
         count += 1
+    for n in range(cells.shape[0]):
+        number[cells[n]] = 0
     return part
 
 
-def clusters_of(cells: Int, index: Int, steps: Steps, least: int, most: int) -> list[Int]:
+def clusters_of(cells: Int, index: Int, steps: Steps, number: Int32, least: int, most: int) -> list[Int]:
     """Clusters of frontier cells.
 
     Args:
         cells: (F,) flat, ascending.
         index: (F, 3) the same by axis.
         steps: on the grid.
+        number: (N,) zeros for every cell of the grid; is left so.
         least: smaller parts of joined cells are left out.
         most: cells along the edge of the cubes into which parts are cut.
 
@@ -46,7 +54,7 @@ def clusters_of(cells: Int, index: Int, steps: Steps, least: int, most: int) -> 
     """
     if not len(cells):
         return []
-    part = _parts(cells, steps)
+    part = _parts(cells, steps, number)
     large = np.bincount(part)[part] >= least
     cells, part, cube = cells[large], part[large], index[large] // most
     order = np.lexsort((cells, *cube.T, part))

@@ -17,18 +17,19 @@ from uavexp.explorer.volume.waves import (
     forget,
     least_change,
     new_wave,
-    reach,
+    reach_all,
+    trace,
 )
 from uavexp.inspection.tour import open_tour
 
 _NEAREST = 6  # places to which ways are sought; those to farther ones lead through these
 _KICKS_PER_PLACE = 10
-_PLACES = 60  # that a tour visits, the nearest; farther ones wait for the next
+PLACES = 40  # that a tour visits, the nearest; farther ones wait for the next
 _MEMORY = 20_000  # pairs
 _NARROW_PRICE = 3.0
 # prices of the kinds of cells on ways over what was seen, without narrow places and with them
-WIDE = Prices(np.array([0.0, 0.0, 1.0, 0.0, 0.0]), np.ones(5))
-ANY = Prices(np.array([0.0, 0.0, 1.0, 0.0, _NARROW_PRICE]), np.ones(5))
+WIDE = Prices(np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0]), np.ones(6))
+ANY = Prices(np.array([0.0, 0.0, 0.0, 1.0, 0.0, _NARROW_PRICE]), np.ones(6))
 
 
 def optimistic(unseen: float, climb: float) -> Prices:
@@ -40,12 +41,13 @@ def optimistic(unseen: float, climb: float) -> Prices:
     """
     narrow = max(unseen, _NARROW_PRICE)
     return Prices(
-        np.array([0.0, unseen, 1.0, narrow, _NARROW_PRICE]), np.array([1.0, climb, 1.0, climb, 1.0])
+        np.array([0.0, unseen, 1.0, 1.0, narrow, _NARROW_PRICE]),
+        np.array([1.0, climb, 1.0, 1.0, climb, 1.0]),
     )
 
 
-def _metres(cost: int, cell_m: float) -> float:
-    return cost * cell_m / UNIT if cost < FAR else np.inf
+def _metres(cost: Int, cell_m: float) -> Float:
+    return np.where(cost < FAR, cost * (cell_m / UNIT), np.inf)
 
 
 @dataclass(slots=True, kw_only=True)
@@ -81,19 +83,22 @@ class Ways:
         self._vehicle, self._known = vehicle, known
         begin(self._own, vehicle)
 
-    def there_m(self, cell: int) -> float:
-        """Length of the way from the vehicle over what was seen; inf when there is none."""
-        if cell == self._vehicle:
-            return 0.0
+    def there_m(self, places: Int) -> Float:
+        """Lengths (P,) of the ways from the vehicle to cells (P,) over what was seen; inf: there is none."""
         cells = self.cells
-        return _metres(reach(self._own, cells.kind, cells.steps, self._known, cell, FAR), cells.cell_m)
+        cost = reach_all(self._own, cells.kind, cells.steps, self._known, places, FAR)
+        return np.where(places == self._vehicle, 0.0, _metres(cost, cells.cell_m))
 
-    def beyond_m(self, cell: int) -> float:
-        """Length of the way to the target, unseen cells being passable at their price; 0 without a target."""
-        if self.target is None:
-            return 0.0
+    def way(self, cell: int) -> Int:
+        """Cells (P,) of the way from the vehicle to a cell to which `there_m` has found one."""
         cells = self.cells
-        cost = reach(self._beyond, cells.kind, cells.steps, self.optimistic, cell, FAR)
+        found: Int = trace(self._own, cells.kind, cells.steps, self._known, cell)
+        return found
+
+    def beyond_m(self, places: Int) -> Float:
+        """Lengths (P,) of the ways to the target, unseen cells being passable at their price."""
+        cells = self.cells
+        cost = reach_all(self._beyond, cells.kind, cells.steps, self.optimistic, places, FAR)
         return _metres(cost, cells.cell_m)
 
     def tour(self, places: Int, first_m: Float, there_m: Float) -> Int:
@@ -104,7 +109,7 @@ class Ways:
             first_m: (P,) what it costs to begin with each.
             there_m: (P,) length of the way from the vehicle to each, finite.
         """
-        kept = np.argsort(there_m, kind="stable")[:_PLACES]
+        kept = np.argsort(there_m, kind="stable")[:PLACES]
         between = self._matrix(places[kept], there_m[kept])
         cost = np.zeros((len(kept) + 1, len(kept) + 1))
         cost[0, 1:] = cost[1:, 0] = first_m[kept]
@@ -121,7 +126,7 @@ class Ways:
         for a in range(count):
             near = np.argsort(straight[a], kind="stable")[1 : _NEAREST + 1]
             missing = [int(b) for b in near if (int(places[a]), int(places[b])) not in self._between]
-            if missing:
+            if missing:  # two places may share a cell
                 self._measure(int(places[a]), places[missing], over[a, missing])
             for b in near:
                 over[a, b] = over[b, a] = min(over[a, b], self._between[int(places[a]), int(places[b])])
@@ -134,7 +139,7 @@ class Ways:
         """Note the lengths of ways from one place to others, as far as they are no longer than `most_m`."""
         cells = self.cells
         begin(self._other, start)
-        for end, bound_m in zip(ends.tolist(), most_m.tolist(), strict=True):
-            most = int(bound_m / cells.cell_m * UNIT) + 1
-            cost = reach(self._other, cells.kind, cells.steps, self._known, end, most) if end != start else 0
-            self._between[start, end] = self._between[end, start] = _metres(cost, cells.cell_m)
+        most = int(most_m.max() / cells.cell_m * UNIT) + 1
+        cost = reach_all(self._other, cells.kind, cells.steps, self._known, ends, most)
+        for end, length_m in zip(ends.tolist(), _metres(cost, cells.cell_m).tolist(), strict=True):
+            self._between[start, end] = self._between[end, start] = length_m

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uavexp.arrays import Bool, Float, Int
+from uavexp.arrays import Bool, Float, Int, Int32
 from uavexp.explorer.volume.cells import Cells
 from uavexp.explorer.volume.clusters import clusters_of
 from uavexp.explorer.volume.views import Places, Sight, is_place, look_from, offsets_around, seen_from
@@ -44,6 +44,7 @@ class Viewpoints:
     def __init__(self, cells: Cells, sight: Sight, places: Places, least: int, most: int) -> None:
         self._cells, self._sight, self._places = cells, sight, places
         self._least, self._most = least, most
+        self._number: Int32 = np.zeros(cells.kind.size, np.int32)
         self._known: dict[bytes, Cluster] = {}
 
     def clusters(self, looks: int, here_m: Float) -> list[Cluster]:
@@ -57,7 +58,7 @@ class Viewpoints:
         frontier = cells.frontier(looks)
         index = cells.index(frontier)
         known = {}
-        for members in clusters_of(frontier, index, cells.steps, self._least, self._most):
+        for members in clusters_of(frontier, index, cells.steps, self._number, self._least, self._most):
             key = members.tobytes()
             cluster = self._known.get(key)
             if cluster is None or self._is_stale(cluster):

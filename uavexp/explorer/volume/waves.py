@@ -165,6 +165,33 @@ def reach(wave: Wave, kind: UInt8, steps: Steps, price: Prices, goal: int, most:
 
 
 @nb.njit(cache=True)
+def reach_all(wave: Wave, kind: UInt8, steps: Steps, price: Prices, goals: Int, most: int) -> Int:
+    """`reach` of many cells (G,)."""
+    cost = np.empty(goals.shape[0], np.int64)
+    for n in range(goals.shape[0]):
+        cost[n] = reach(wave, kind, steps, price, goals[n], most)
+    return cost
+
+
+@nb.njit(cache=True)
+def trace(wave: Wave, kind: UInt8, steps: Steps, price: Prices, goal: int) -> Int:
+    """Cells (P,) of the way to a cell that was reached, the source first."""
+    cost = wave.cost
+    way, count = np.empty(wave.clock[_LEFT] + 2, np.int64), 1
+    way[0] = at = goal
+    while cost[at] > 0 and count < way.shape[0]:
+        for n in range(steps.offset.shape[0]):
+            near = at - steps.offset[n]
+            if cost[near] < cost[at] and (
+                cost[near] + _step_cost(steps, n, price, kind[near], kind[at]) == cost[at]
+            ):
+                way[count] = at = near
+                count += 1
+                break
+    return way[:count][::-1].copy()
+
+
+@nb.njit(cache=True)
 def forget(wave: Wave, kind: UInt8, steps: Steps, price: Prices, level: int) -> None:
     """Take back every cost above the level and go on from there; what costs less must hold as it is.
 
