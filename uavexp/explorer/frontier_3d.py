@@ -95,10 +95,10 @@ class Frontier3d:
     covered_share: Share = 0.3  # a goal is left when so little of what it shows is still unseen [ours]
     rethink_s: Positive = 1.0  # s, a goal is compared with others after so long [ours]
     hysteresis_m: NonNegative = 1.5  # m, that another goal must be better [ours]
-    turn_m: NonNegative = 1.5  # m, that turning back in flight counts as, at most [ours]
+    turn_m: NonNegative = 1.5  # m, that turning back in flight, and half a turn of the yaw, count as [ours]
     look_m: NonNegative = 5.0  # m, so near to a place the yaw is that with which it shows most; before, the
     # way ahead is looked at [ours]
-    looks: Annotated[int, between(1, 200)] = 3  # cells looked at so often in vain are given up [ours]
+    looks: Annotated[int, between(1, 200)] = 2  # cells looked at so often in vain are given up [ours]
     aside_radius_m: Positive = 0.4  # m, places so near to one to which no plan led are set aside with it ...
     set_aside_s: NonNegative = 10.0  # s, ... for so long [ours]
     _limits: Limits | None = field(init=False, repr=False, default=None)
@@ -268,7 +268,7 @@ class Frontier3d:
         found = space.candidates(clusters, self._aside_of, here_m, self.hysteresis_m + self.turn_m)
         if not found.clusters:
             return None
-        cost_m = found.there_m + self._turning_m(observation, found.eyes_m)
+        cost_m = found.there_m + self._turning_m(observation, found)
         going_on = np.zeros(len(cost_m), dtype=np.bool_)
         if kept is not None and not kept.is_target:
             going_on = np.linalg.norm(found.eyes_m - kept.place_m, axis=1) < _SAME_M
@@ -293,13 +293,18 @@ class Frontier3d:
         cells = space.viewpoints.shown(eye_m, yaw_rad, cluster.cells)
         return cells, math.nan if self.horizontal_fov_deg >= 360.0 else yaw_rad
 
-    def _turning_m(self, observation: Observation, points_m: Float) -> Float:
-        """What it costs in flight to turn towards points (N, 3)."""
-        velocity = observation.state.velocity_mps
-        ahead = points_m - observation.state.position_m
-        speed, away = float(np.linalg.norm(velocity)), np.linalg.norm(ahead, axis=1)
-        cosine = ahead @ velocity / np.maximum(speed * away, 1e-6)
-        return np.asarray(self.turn_m * min(speed, 1.0) * 0.5 * (1.0 - cosine))
+    def _turning_m(self, observation: Observation, found: Candidates) -> Float:
+        """What it costs (N,) to turn in flight towards places, and to the yaws with which they show most."""
+        state = observation.state
+        ahead = found.eyes_m - state.position_m
+        speed, away = float(np.linalg.norm(state.velocity_mps)), np.linalg.norm(ahead, axis=1)
+        cosine = ahead @ state.velocity_mps / np.maximum(speed * away, 1e-6)
+        back = min(speed, 1.0) * 0.5 * (1.0 - cosine)
+        if self.horizontal_fov_deg >= 360.0:
+            return np.asarray(self.turn_m * back)
+        yaws = [item.yaws_rad[n] for item, n in zip(found.clusters, found.eye, strict=True)]
+        turn = np.abs(wrap_angle(np.array(yaws) - yaw_of(state.quaternion_wxyz))) / math.pi
+        return np.asarray(self.turn_m * (back + turn))
 
     def _aside_of(self, points_m: Float) -> Bool:
         """Which points (N, 3) lie near a place set aside."""

@@ -1,8 +1,8 @@
 """What a sensor that turns with the vehicle would see of frontier cells from places near them (numba).
 
 A camera sees a pyramid about its axis, a sensor of 180 degrees and more all azimuths within its half
-width; both see from the lowest to the highest elevation. Sight ends at occupied and at unseen voxels; the
-last cell before the one looked at is not asked for. So no place is chosen for what it would see through
+width; both see from the lowest to the highest elevation. Sight ends at occupied and at unseen voxels, but for
+unseen ones next to the cell that is looked at. So no place is chosen for what it would see through
 a wall, nor a place below a shaft for what only a sensor that looks up would see.
 """
 
@@ -15,9 +15,10 @@ import numba as nb
 import numpy as np
 
 from uavexp.arrays import Bool, Float, Float32, Int, UInt8
-from uavexp.field import FREE, UNKNOWN, value_at
+from uavexp.field import FREE, OCCUPIED, UNKNOWN, value_at
 
 _STRIDE_VOXELS = 0.7  # between two looks at a line of sight
+_NEAR_CELLS = 1.5
 _RADII_M = (0.5, 1.0, 1.7, 2.5, 3.4)
 _TURNS = 10
 _HEIGHTS_M = (0.0, 0.6, -0.6, 1.4, -1.4)
@@ -76,13 +77,15 @@ def is_place(places: Places, x: float, y: float, z: float) -> bool:
 
 @nb.njit(cache=True)
 def _sees(places: Places, eye: Float, point: Float) -> bool:
-    """Whether all voxels from an eye (3,) to a cell's length before a point (3,) are free."""
+    """Whether nothing occupied lies between an eye (3,) and a point (3,), nor unseen but near the point."""
     x, y, z = point[0] - eye[0], point[1] - eye[1], point[2] - eye[2]
     length = math.sqrt(x * x + y * y + z * z)
     stride = _STRIDE_VOXELS * places.voxel_m
-    for n in range(1, int((length - 1.5 * places.cell_m) / stride) + 1):
+    for n in range(1, int(length / stride) + 1):
         share = n * stride / length
-        if _state_at(places, eye[0] + x * share, eye[1] + y * share, eye[2] + z * share) != FREE:
+        state = _state_at(places, eye[0] + x * share, eye[1] + y * share, eye[2] + z * share)
+        near = length - n * stride < _NEAR_CELLS * places.cell_m
+        if state == OCCUPIED or (state == UNKNOWN and not near):
             return False
     return True
 
