@@ -10,11 +10,13 @@ from uavexp.braking import with_stop
 from uavexp.check.fields import empty
 from uavexp.check.hall import LIMITS, STRAIGHT, goal_at, observe, room
 from uavexp.field import DistanceField
+from uavexp.trajectory import evaluate, sample_times
 from uavexp.trigger.base import TriggerPolicy
 from uavexp.trigger.collision_check import CollisionCheck
 from uavexp.trigger.distance import Distance
 from uavexp.trigger.expiry import Expiry
 from uavexp.trigger.frontier_covered import FrontierCovered
+from uavexp.trigger.path_cost import place_cost
 from uavexp.types import Observation
 
 FREE = room()
@@ -178,3 +180,32 @@ class TestExpiry:
             assert fired(Expiry(), observe(FREE, goal=goal_at(5.5), best=best)) == expected
         other = observe(FREE, goal=goal_at(5.5), best=goal_at(2.0))
         assert fired(Expiry(goal_updated=False), other) == ""
+
+    def test_near_the_target_only_a_collision_counts(self) -> None:
+        target, other = goal_at(5.5, is_target=True), goal_at(2.0)
+        left_m = 5.5 - 0.5 - (5.0 - 1.0)  # at 5 s, of a plan flown at 1 m/s from 1 s on
+        for nearby_m, expected in ((0.0, "goal"), (left_m - 0.3, "goal"), (left_m + 1.0, "")):
+            seen = observe(FREE, time_s=5.0, goal=target, best=other)
+            assert fired(Expiry(nearby_m=nearby_m), seen) == expected
+        frontier = observe(FREE, time_s=5.0, goal=goal_at(5.5), best=other)
+        assert fired(Expiry(nearby_m=9.0), frontier) == "goal"
+        blocked = observe(AHEAD, goal=target, best=other)
+        assert fired(Expiry(nearby_m=9.0), blocked) == "collision"
+
+    def test_a_path_that_has_become_dearer_is_replaced(self) -> None:
+        points_m = evaluate(FLOWN, sample_times(FLOWN, 1.0, 0.05))[0]
+        costs = [place_cost(field.distance_m(points_m), LIMITS.body_radius_m) for field in (FREE, AHEAD)]
+        rise = costs[1].sum() / costs[0].sum() - 1.0
+        assert rise > 0.1
+        for share, expected in ((rise - 0.01, "cost"), (rise + 0.01, "")):
+            policy = Expiry(clearance_m=0.0, cost_rise=share)
+            assert fired(policy, observe(AHEAD, time_s=1.0)) == expected
+            assert fired(policy, observe(AHEAD, time_s=1.0), at_plan=AHEAD) == ""
+        assert fired(Expiry(clearance_m=0.0, cost_rise=0.01), observe(AHEAD, time_s=5.9)) == ""  # passed
+
+
+def test_a_place_costs_as_on_nav2_s_costmap() -> None:
+    radius_m = 0.2
+    cost = place_cost(np.array([0.0, 0.2, 0.5, 0.699, 0.7, 3.0]), radius_m)
+    inflated = 0.8 * 252.0 / 50.0 * np.exp(-3.0 * np.array([0.0, 0.0, 0.3, 0.499]))
+    np.testing.assert_allclose(cost, [*(1.0 + inflated), 1.0, 1.0])
