@@ -34,7 +34,7 @@ from uavexp.pilot.recovering import Recovering, ending, tried
 from uavexp.pilot.recovery import Rung
 from uavexp.pilot.rules import Rules
 from uavexp.pilot.steering import Steering
-from uavexp.pilot.touch import BALL_M, touched_m
+from uavexp.pilot.touch import BALL_M
 from uavexp.trajectory import Trajectory, evaluate, hover_before, sample_times
 from uavexp.types import (
     Decision,
@@ -51,6 +51,7 @@ from uavexp.types import (
 _GOALS_FAULT = (PlanStatus.GOAL_BLOCKED, PlanStatus.NO_PATH, PlanStatus.NOT_CLEAR)  # another may do
 _ANYWAY = (*_GOALS_FAULT, PlanStatus.LIMITS, PlanStatus.SOLVER)  # the same for a vehicle that is lost
 _WARY_S = 5.0  # after a touch
+_OFF_M = 0.3  # clearance of a place to draw back to from what was touched
 _AHEAD_S = 0.1
 _SAME_PLACE_M = 0.5
 
@@ -158,7 +159,9 @@ class HoldingPilot:
             decision = self.crew.trigger.decide(observation)
         # After a failure the pilot tries again by itself, equally often under every policy.
         if behind is not None:
-            self.request(Decision(replan=True, cause=behind.name), observation)
+            asked = Decision(replan=True, cause=behind.name)
+            if self._touched_s < observation.time_s or not self._back_up(asked, observation, _OFF_M):
+                self.request(asked, observation)
         elif decision.replan and self.flown is not None and not self.failure:
             self.request(decision, observation)
         return decision.score
@@ -295,8 +298,7 @@ class HoldingPilot:
             return
         if not self.failure:
             self._brake(observation, "the safety holds it")
-        if rung is Rung.BACK:
-            self._back_up(decision, observation)
+        if rung is Rung.BACK and self._back_up(decision, observation):
             return
         if rung is Rung.NOTE and self.recovery.held_at_m is not None:
             self.crew.note_obstacle(self.recovery.held_at_m, BALL_M)
@@ -306,12 +308,14 @@ class HoldingPilot:
             if not self.failure:
                 return
 
-    def _back_up(self, decision: Decision, observation: Observation) -> None:
-        """Fly back along the way that was flown."""
-        goal, result, flown = self.recovery.back(observation, self.crew.guard)
+    def _back_up(self, decision: Decision, observation: Observation, room_m: float | None = None) -> bool:
+        """Fly back along the way that was flown; False: that is not possible."""
+        goal, result, flown = self.recovery.back(observation, self.crew.guard, room_m)
+        if flown is None:
+            return False
         self.replans.append(replan_of(decision, observation, goal, result, self.trajectory))
-        if flown is not None:
-            self.flown, self._wait_for_rest = flown, True
+        self.flown, self._wait_for_rest = flown, True
+        return True
 
     def _brake(self, observation: Observation, reason: str) -> None:
         """Leave any plan in flight and stop, along the way where the safety does; hold where that ends."""
@@ -323,7 +327,8 @@ class HoldingPilot:
     def _stops_behind(self, observation: Observation) -> causes.Cause | None:
         """Why the vehicle stops where it is from now on: it fell behind, or it touches; None: it does not."""
         error_m, most_m = error_of(observation), self.rules.restart_error_m
-        touches, behind = self.recovery.touches(observation), 0.0 < most_m <= error_m
+        behind = 0.0 < most_m <= error_m
+        touches = self.recovery.touches(observation, behind=behind)
         if self.flown is None or not (behind or touches):
             return None
         self.failure = f"the vehicle was {error_m:.2f} m from its reference"
@@ -331,9 +336,9 @@ class HoldingPilot:
         if not touches:
             return causes.BEHIND
         self._touched_s = observation.time_s
-        obstacle_m = touched_m(observation, self.crew.limits)
-        if obstacle_m is None:
+        ball = self.recovery.noted(observation)
+        if ball is None:
             return causes.BEHIND
-        self.crew.note_obstacle(obstacle_m, BALL_M)
+        self.crew.note_obstacle(*ball)
         self.failure += ", and nothing is mapped in its way"
         return causes.NOTED

@@ -17,7 +17,7 @@ from uavexp.pilot.heading import room_to_turn
 from uavexp.pilot.noting import here
 from uavexp.pilot.recovery import Ladder, Patience, Rung, Situation, climbed
 from uavexp.pilot.rules import Rules
-from uavexp.pilot.touch import Touch
+from uavexp.pilot.touch import Touch, ball_m, is_stopped_short, touched_m
 from uavexp.safety.base import Guard
 from uavexp.types import Goal, Limits, Observation, Outcome, PlanResult, PlanStatus, Squeeze
 
@@ -39,6 +39,7 @@ class Recovering:
     refused_s: float = -math.inf  # when a goal was set aside last, because no plan led there
     held_at_m: Float | None = None  # (3,) what the safety holds the vehicle back from
     _way_m: Float = field(default_factory=lambda: np.zeros((0, 3)))
+    _touched_m: list[Float] = field(default_factory=list)
     _seen_m3: float = 0.0
 
     @property
@@ -58,11 +59,19 @@ class Recovering:
         self._way_m = remembered(self._way_m, observation.state.position_m, self.rules.back_up_m)
         self.touch = self.touch.felt(observation)
 
-    def touches(self, observation: Observation) -> bool:
-        """Whether the vehicle stands against something; once told, it begins anew."""
-        holds = self.touch.holds(observation.time_s)
+    def touches(self, observation: Observation, *, behind: bool) -> bool:
+        """Whether the vehicle stands against something, or slides along it; once told, it begins anew."""
+        holds = self.touch.holds(observation.time_s) or (behind and is_stopped_short(observation))
         self.touch = Touch() if holds else self.touch
         return holds
+
+    def noted(self, observation: Observation) -> tuple[Float, float] | None:
+        """Ball, centre (3,) and radius, that the vehicle stands against; None: what it does is mapped."""
+        here_m = observation.state.position_m
+        radius_m = ball_m(here_m, self._touched_m)
+        centre_m = touched_m(observation, self.limits, radius_m)
+        self._touched_m.append(here_m.copy())
+        return None if centre_m is None else (centre_m, radius_m)
 
     def misses_goals(self, observation: Observation) -> bool:
         """Whether there may be goals that are not offered: refused, or beyond the narrow place it is in."""
@@ -88,9 +97,18 @@ class Recovering:
         rung = self.ladder.rung
         return None if rung in (before.rung, Rung.GOALS) else rung
 
-    def back(self, observation: Observation, guard: Guard) -> tuple[Goal, PlanResult, Flown | None]:
-        """Where to back up to, the plan, and what is to be flown of it: nothing where the safety refuses."""
-        way_m = self._back_m(observation)
+    def back(
+        self, observation: Observation, guard: Guard, room_m: float | None = None
+    ) -> tuple[Goal, PlanResult, Flown | None]:
+        """Where to back up to, the plan, and what is to be flown of it: nothing where the safety refuses.
+
+        `room_m` is the clearance looked for, in place of the usual one.
+        """
+        way_m = self._back_m(observation, room_m)
+        if len(way_m) < 2:
+            return here(observation), PlanResult(status=PlanStatus.NO_PATH, reason="no way back"), None
+        at = replace(observation.reference, position_m=observation.state.position_m)
+        observation = replace(observation, reference=at)  # it begins where the vehicle is
         plan = back_up(way_m, observation.time_s, self.rules.back_up_mps)
         goal = replace(here(observation), position_m=way_m[-1])
         way = guard.flyable(plan, plan.start_s, AS_PLANNED.at(plan.start_s)[1:], observation)
@@ -110,10 +128,10 @@ class Recovering:
         far = np.linalg.norm(way_m - way_m[0], axis=1) >= _BEYOND * self.limits.body_radius_m
         self.held_at_m = way_m[int(np.argmax(far))] if far.any() else None
 
-    def _back_m(self, observation: Observation) -> Float:
+    def _back_m(self, observation: Observation, room_m: float | None = None) -> Float:
         """Places (N, 3) back along the way flown to where there is room; none: there are none."""
         here_m = observation.state.position_m
-        return way_back(self._way_m, here_m, observation.field, self.rules.back_up_clearance_m)
+        return way_back(self._way_m, here_m, observation.field, room_m or self.rules.back_up_clearance_m)
 
     def _is_possible(self, rung: Rung, observation: Observation) -> bool:
         if rung is Rung.LOOK:

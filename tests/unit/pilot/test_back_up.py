@@ -83,12 +83,12 @@ def test_who_stands_off_its_reference_touches_and_who_moves_or_waits_does_not() 
 
 
 def test_the_obstacle_is_noted_beyond_the_body_and_only_where_none_is_mapped() -> None:
-    ball_m = touched_m(pressed(0.2), LIMITS)
+    ball_m = touched_m(pressed(0.2), LIMITS, BALL_M)
     assert ball_m is not None
     near_m = ball_m[0] - BALL_M - 5.8
     assert 0.5 * LIMITS.body_size_m[0] < near_m < LIMITS.body_radius_m
     np.testing.assert_allclose(ball_m[1:], [2.05, 1.05])
-    assert touched_m(pressed(0.2, walled=True), LIMITS) is None
+    assert touched_m(pressed(0.2, walled=True), LIMITS, BALL_M) is None
 
 
 @pytest.mark.parametrize("half_m", [0.2, 0.3, 0.4])
