@@ -42,6 +42,8 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("--info", action="store_true")
     parser.add_argument("--version", action="store_true")
     parser.add_argument("--config-dir", "-cd", metavar="DIR")
+    parser.add_argument("--config-name", "-cn", metavar="NAME")
+    parser.add_argument("--shell-completion", "-sc", metavar="REQUEST")
     return parser.parse_intermixed_args(arguments)
 
 
@@ -50,6 +52,11 @@ def _run(typed: Sequence[str]) -> int:
 
     arguments = _parse(typed)
     folder = user_folder(arguments.config_dir) if arguments.config_dir is not None else None
+    if arguments.shell_completion is not None:
+        from uavexp.cli.completion import completion
+
+        sys.stdout.write(completion(arguments.shell_completion, folder))
+        return 0
     if arguments.help:
         from uavexp.cli.helptext import group_names, help_text
 
@@ -72,6 +79,10 @@ def _run(typed: Sequence[str]) -> int:
     from uavexp.config.overrides import parse_settings
 
     settings = parse_settings(arguments.overrides)
+    if arguments.config_name is not None:
+        from uavexp.config.named import with_named
+
+        settings = with_named(arguments.config_name, folder, settings)
     if not arguments.cfg:
         from uavexp.sweep.head_start import give_head_start
 

@@ -44,6 +44,8 @@ flags
   --version            print the version
   --config-dir DIR     your own options, DIR/<group>/<option>.yaml; their classes must be in a package
                        named in the environment variable UAVEXP_TRUST
+  --config-name NAME   settings from DIR/NAME.yaml (Hydra's -cn); what is typed wins
+  -sc install=bash     completion of the command uavexp (or zsh, fish): eval "$(uavexp -sc install=bash)"
 """
 
 

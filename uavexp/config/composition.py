@@ -17,7 +17,14 @@ from typing import Any
 from uavexp.config.build import GROUPS, check_config, top_level
 from uavexp.config.experiment import Experiment, LabelledCell, expand, list_experiments, read_experiment
 from uavexp.config.interpolation import resolved
-from uavexp.config.options import EXPERIMENT_GROUP, PRESET_GROUP, RUNNER_GROUP, list_options, read_option
+from uavexp.config.options import (
+    EXPERIMENT_GROUP,
+    PRESET_GROUP,
+    RUNNER_GROUP,
+    list_options,
+    place_in,
+    read_option,
+)
 from uavexp.config.overrides import Setting, expand_grid, expand_seeds, render
 from uavexp.config.own_metrics import modules_of
 from uavexp.config.trees import CONFIG_NAME, TRIGGER_GROUP, Trees
@@ -64,11 +71,13 @@ class Composer:
     options: dict[str, dict[str, Path]] = field(init=False)
     experiments: dict[str, Path] = field(init=False)
     _keys: tuple[str, ...] = field(init=False, repr=False)  # of a composed tree
+    _groups: tuple[str, ...] = field(init=False, repr=False)  # that there are; a user's file may be elsewhere
     _trees: Trees = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         folders = [conf_folder(), *([self.user_folder] if self.user_folder else [])]
         self.options = list_options(folders)
+        self._groups = tuple(list_options(folders[:1]))
         self.experiments = list_experiments(self.user_folder)
         shared = read_option(conf_folder() / f"{CONFIG_NAME}.yaml").parameters
         self._keys = (*GROUPS, *(item.name for item in shared), RUNNER_GROUP, "hydra")
@@ -149,6 +158,15 @@ class Composer:
 
     def cell(self, settings: Sequence[Setting], labels: Mapping[str, str] | None = None) -> Cell:
         """Compose and check one cell; each setting has one value."""
+        try:
+            return self._cell(settings, labels)
+        except ConfigError as error:
+            files = (self.options.get(item.key, {}).get(str(item.values[0])) for item in settings)
+            own = [file for file in files if file and self.user_folder in file.parents]
+            place = place_in(own, str(error), [item.key for item in settings])
+            raise ConfigError(f"{error}{place}") from error
+
+    def _cell(self, settings: Sequence[Setting], labels: Mapping[str, str] | None) -> Cell:
         tree = self.compose(settings)
         choices = tree["hydra"]["runtime"]["choices"]
         self._refuse_stray_keys(tree, choices)
@@ -209,11 +227,14 @@ class Composer:
 
     def _option(self, group: str, name: Any) -> str:
         known = self.options.get(group, {})
+        if group not in self._groups:
+            told = f"{self.user_folder}/{group.replace('.', '/')} is the folder of no group"
+            raise ConfigError(f"{group}={name}: {told}{nearest(group, self._groups)}")
         if isinstance(name, str) and name in known:
             return name
-        raise ConfigError(
-            f"{group}={name}: no such option{nearest(str(name), known)}; {group} may be {', '.join(known)}"
-        )
+        elsewhere = [other for other, options in self.options.items() if name in options]
+        hint = f" ({name} is in {elsewhere[0]})" if elsewhere else nearest(str(name), known)
+        raise ConfigError(f"{group}={name}: no such option{hint}; {group} may be {', '.join(known)}")
 
     def _apply(self, tree: dict[str, Any], setting: Setting) -> None:
         """Set one value in place; the key must exist unless it is added."""

@@ -70,6 +70,14 @@ def text_of(file: Path) -> str:
         raise ConfigError(f"{file} cannot be read: {error.strerror}") from error
 
 
+def place_in(files: Sequence[Path], message: str, typed: Sequence[str]) -> str:
+    """In which of the files the key that a message begins with stands, in words; none if it was typed."""
+    key = message.split(" ")[0].rstrip(":")
+    word = re.compile(rf"\b{re.escape(key.rpartition('.')[2])}\b")
+    there = [file for file in files if key not in typed and word.search(text_of(file))]
+    return "".join(f"; it stands in {file}" for file in there)
+
+
 def read_option(file: Path) -> Option:
     """Description (leading comment) and parameters of one yaml file."""
     description: list[str] = []

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import copy
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from uavexp.config.options import PRESET_GROUP
+from uavexp.config.options import PRESET_GROUP, list_options
 from uavexp.config.overrides import quoted
 from uavexp.errors import ConfigError, one_line
+from uavexp.parameters import nearest
 from uavexp.paths import conf_folder
 
 TRIGGER_GROUP = "trigger"  # what presets choose
@@ -74,7 +75,7 @@ class Trees:
         import yaml  # type: ignore[import-untyped]
         from hydra import compose, initialize_config_dir
         from hydra.core.global_hydra import GlobalHydra
-        from hydra.errors import HydraException
+        from hydra.errors import HydraException, MissingConfigException
         from omegaconf import OmegaConf
         from omegaconf.errors import OmegaConfBaseException
 
@@ -94,9 +95,20 @@ class Trees:
         except RecursionError as error:
             words = "a configuration is too deep, or holds itself"
             raise ConfigError(f"the configuration does not compose: {words}") from error
+        except MissingConfigException as error:
+            raise ConfigError(self._missing(str(error.missing_cfg_file), arguments)) from error
         except bad_input as error:
             raise ConfigError(f"the configuration does not compose: {_with_cause(error)}") from error
         return dict(tree)
+
+    def _missing(self, name: str, arguments: Sequence[str]) -> str:
+        """What to say of an option that an option or a preset asks for and that does not exist."""
+        group, _, option = name.rpartition("/")
+        known = list_options([conf_folder(), *([self.user_folder] if self.user_folder else [])])
+        there = known.get(group.replace("/", "."), {})
+        asking = " ".join(word for word in arguments if not word.startswith("hydra."))
+        hint = f"{nearest(option, there)}; {group} may be {', '.join(there)}" if there else ""
+        return f"{asking} asks for {group}={option}: no such option{hint}"
 
 
 def _without(tree: Mapping[str, Any], group: str) -> dict[str, Any]:

@@ -30,3 +30,8 @@ def test_a_sweep_over_planners_names_the_planner_in_each_line() -> None:
 def test_what_the_strategy_says_is_not_said_twice() -> None:
     head, *_ = printed([row("mcr"), row("tbr", "tbr")], ["cell"])
     assert head.split()[0] == "strategy"
+
+
+def test_causes_of_ones_own_are_told_by_name_and_shares_are_no_causes() -> None:
+    counts = {"replans": 3, "replans_map": 1, "replans_metres": 2, "replans_near_change_share": 1.0}
+    assert "3 (1 map, 2 metres)" in printed([row("mine") | counts], ["cell"])[1]
