@@ -75,6 +75,8 @@ class Ticks:
     # (M,) least mapped distance over the rest of the flown trajectory; NaN where nothing is left
     # of one, empty when it was not measured
     remaining_clearance_m: Float = field(default_factory=none())
+    # (M,) observed share of the reachable free volume; empty for a flight with a target
+    seen_so_far: Float = field(default_factory=none())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from uavexp.map_grid import map_grid
 from uavexp.mission.base import Flown
 from uavexp.path_clearance import clearance_ahead_m
 from uavexp.scene import Scene
+from uavexp.seen_share import seen_share, seen_so_far
 from uavexp.types import (
     Bodies,
     Limits,
@@ -98,6 +99,7 @@ class Recorder:
         self._step_s = step_s
         self._ticks: list[_Tick] = []
         self._occupied: list[Int32] = []  # voxels found so, one array per ESDF update
+        self._first_seen: list[Int32] = []  # the same of those seen for the first time
         self._goals_m: list[Float] = []
         self._bodies: list[Bodies] = []  # one per step, if there are any
         self._tracks: list[Tracks] = []  # one per ESDF update
@@ -132,6 +134,7 @@ class Recorder:
             (observation.time_s, clearance_m, changed, score, remaining_clearance_m(observation))
         )
         self._occupied.append(observation.update.voxel[observation.update.occupied])
+        self._first_seen.append(observation.update.voxel[observation.update.first_seen])
         self._tracks.append(observation.tracks)
         goal = observation.goal
         if goal is not None and not (self._goals_m and np.array_equal(self._goals_m[-1], goal.position_m)):
@@ -155,13 +158,19 @@ class Recorder:
         replans: tuple[Replan, ...],
         dropped_triggers: int,
         contacts: tuple[Contact, ...],
-        seen_share: float,
+        reachable_m: Float | None,
         first_plan: PlanResult | None,
         limits: Limits,
         inspection: Inspection,
         watch: Stopwatch,
     ) -> TrialLog:
-        """Return the finished log; true clearances are measured here, all at once."""
+        """Return the finished log; true clearances are measured here, all at once.
+
+        `reachable_m` (E, 3) is the volume of which a share is seen; None: the flight has a target.
+        """
+        shares = np.zeros(0)
+        if reachable_m is not None:
+            shares = seen_so_far(field, reachable_m, self._first_seen)
         mapped = np.flatnonzero(field.state == OCCUPIED)
         rows = self.rows[: last_step + 1]
         position_m = rows[:, _POSITION]
@@ -171,12 +180,12 @@ class Recorder:
             reason=reason,
             step_s=self._step_s,
             steps=_step_rows(rows, self._step_s, np.minimum(fixed_m, mover_m) if mover_m.size else fixed_m),
-            ticks=_tick_rows(self._ticks),
+            ticks=replace(_tick_rows(self._ticks), seen_so_far=shares),
             replans=replans,
             dropped_triggers=dropped_triggers,
             contacts=(*contacts, *_inside_solids(fixed_m, position_m, contacts, self._step_s)),
             goals_m=np.array(self._goals_m).reshape(-1, 3),
-            seen_share=seen_share,
+            seen_share=math.nan if reachable_m is None else seen_share(field, reachable_m),
             mapped_m=field.voxel_centres_m(mapped).astype(np.float32),
             grid=map_grid(field, mapped, self._occupied, [row[0] for row in self._ticks]),
             movers=_mover_rows(self._bodies, mover_m, len(rows)),

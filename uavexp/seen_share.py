@@ -1,19 +1,20 @@
-"""How much of what could be seen has been seen, in truth."""
+"""How much of what could be seen has been seen, in truth: at the end, and over time."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from scipy import ndimage
 
+from uavexp.arrays import Float, Int32
 from uavexp.field import DistanceField
 from uavexp.scene import Scene
 from uavexp.types import Limits, World
 
 
-def seen_share(
-    world: World, scene: Scene, field: DistanceField, limits: Limits, cell_m: float = 0.25
-) -> float:
-    """Observed share of the reachable volume, 0 to 1.
+def reachable_m(world: World, scene: Scene, limits: Limits, cell_m: float = 0.25) -> Float:
+    """Middles (E, 3) of the cells of the reachable volume.
 
     Reachable: free cells of the flight bounds whose true clearance exceeds the body's radius,
     face-connected to the start.
@@ -28,5 +29,24 @@ def seen_share(
     start = np.unravel_index(
         np.argmin(np.where(clear, np.linalg.norm(cells_m - world.start_m, axis=-1), np.inf)), clear.shape
     )
-    reachable = label == label[start]
-    return float(field.observed(cells_m[reachable]).mean())
+    return np.asarray(cells_m[label == label[start]])
+
+
+def seen_share(field: DistanceField, cells_m: Float) -> float:
+    """Observed share of cells (E, 3), 0 to 1."""
+    return float(field.observed(cells_m).mean())
+
+
+def seen_so_far(field: DistanceField, cells_m: Float, first_seen: Sequence[Int32]) -> Float:
+    """Observed share (M,) of cells (E, 3) after each update of a map.
+
+    Args:
+        field: the map.
+        cells_m: all within it.
+        first_seen: the voxels that each update saw for the first time.
+    """
+    index = np.floor((cells_m - field.origin_m) / field.voxel_size_m).astype(np.int64)
+    voxel = np.ravel_multi_index(tuple(index.T), field.state.shape)
+    cells_in = np.bincount(voxel, minlength=field.state.size)
+    seen = np.cumsum([int(cells_in[voxels].sum()) for voxels in first_seen])
+    return np.asarray(seen / len(cells_m))

@@ -33,7 +33,7 @@ from uavexp.recorder import Recorder, Stopwatch
 from uavexp.safety.base import Safety
 from uavexp.scene import Scene
 from uavexp.seeding import Stream, generator, only_seeded_draws
-from uavexp.seen_share import seen_share
+from uavexp.seen_share import reachable_m
 from uavexp.sensor.base import Sensor
 from uavexp.trigger.base import TriggerPolicy
 from uavexp.types import Limits, MapUpdate, Observation, Outcome, Reference, State, Tracks, World
@@ -257,7 +257,7 @@ class _Flight:
             first_plan=pilot.first_plan,
             limits=limits,
             inspection=parts.mission.findings(),
-            seen_share=seen_share(self.world, self.scene, field, limits) if exploring else math.nan,
+            reachable_m=reachable_m(self.world, self.scene, limits) if exploring else None,
             watch=self.watch,
         )
 

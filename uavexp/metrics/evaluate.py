@@ -8,6 +8,7 @@ from uavexp.metrics import (
     clearance,
     coverage,
     ending,
+    exploration,
     path,
     plan,
     replanning,
@@ -28,6 +29,7 @@ METRICS: Metrics = {
     **plan.METRICS,
     **tracking_movers.METRICS,
     **coverage.METRICS,
+    **exploration.METRICS,
     **barn.METRICS,
 }
 _BY_COLUMN = {metric.column: metric for metric in METRICS}

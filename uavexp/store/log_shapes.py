@@ -21,7 +21,7 @@ NEEDED = {
     "goals_m": "G 3", "mapped_m": "N 3",
 }  # fmt: skip
 OPTIONAL = {
-    "remaining_clearance_m": "M",
+    "remaining_clearance_m": "M", "seen_so_far": "M",
     "map_origin_m": "3", "map_voxel_size_m": "", "map_shape": "3", "map_free": "F", "map_occupied_s": "N",
     "mover_shape": "B", "mover_half_size_m": "B 3", "mover_position_m": "T B 3", "mover_clearance_m": "T",
     "track_count": "M", "track_identity": "S", "track_position_m": "S 3", "track_velocity_mps": "S 3",

@@ -40,6 +40,7 @@ _DAMAGE = (
     SyntaxError, zipfile.BadZipFile, zlib.error, struct.error,
 )  # fmt: skip  # what unpacking a bad file raises
 _LATER = ("track_swerve_m",)  # added since: left out while empty, so that digests without it stay
+_LEFT_OUT = ("seen_so_far",)  # of logs in which it is empty: most flights have a target
 _RAGGED = ("changed_m", "trajectory_m")  # (n, 3) per replan, n differing
 
 

@@ -16,7 +16,7 @@ from uavexp.mission.explore import Explore
 from uavexp.mission.goto import Goto
 from uavexp.recorder import Recorder
 from uavexp.scene import Scene
-from uavexp.seen_share import seen_share
+from uavexp.seen_share import reachable_m, seen_share, seen_so_far
 from uavexp.types import Bodies, Observation, Outcome, Reference, State, World
 from uavexp.world.random_columns import RandomColumns
 
@@ -96,4 +96,32 @@ def test_seen_share_is_nothing_or_all(hall: World, seen: int, share: float) -> N
         distance=np.full(shape, 2.0, dtype=np.float32),
         state=np.full(shape, seen, dtype=np.uint8),
     )
-    assert seen_share(hall, Scene(hall), field, LIMITS) == share
+    cells_m = reachable_m(hall, Scene(hall), LIMITS)
+    assert seen_share(field, cells_m) == share
+    voxels = np.flatnonzero(field.state).astype(np.int32)
+    halves = [voxels[::2], voxels[1::2], voxels[:0]]
+    so_far = seen_so_far(field, cells_m, halves)
+    assert so_far[-1] == so_far[1] == share
+    assert so_far[0] <= share
+
+
+def test_home_is_flown_to_when_nothing_is_left_and_ends_the_mission(hall: World) -> None:
+    mission = Explore(patience_s=2.0, return_home=True)
+    mission.reset(hall, Scene(hall), LIMITS)
+    away = hall.start_m + np.array([3.0, 0.0, 0.0])
+    assert mission.home_m is None
+    assert mission.outcome(flown([3.0, 3.1], [away] * 2), at(3.0, goal=False)) is None
+    assert mission.home_m is not None
+    np.testing.assert_array_equal(mission.home_m, hall.start_m)
+    assert mission.outcome(flown([3.2, 3.3], [away] * 2), at(3.2)) is None
+    near = hall.start_m + np.array([0.2, 0.0, 0.0])
+    assert mission.outcome(flown([3.4, 3.5], [away, near]), at(3.4)) == (1, Outcome.EXPLORED)
+    assert mission.target_m is None
+
+
+def test_a_home_that_cannot_be_reached_ends_the_mission_after_the_patience(hall: World) -> None:
+    mission = Explore(patience_s=2.0, return_home=True)
+    mission.reset(hall, Scene(hall), LIMITS)
+    away = hall.start_m + np.array([3.0, 0.0, 0.0])
+    assert mission.outcome(flown([3.0], [away]), at(3.0, goal=False)) is None
+    assert mission.outcome(flown([4.9, 5.1], [away] * 2), at(4.9, goal=False)) == (1, Outcome.EXPLORED)
