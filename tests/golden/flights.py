@@ -44,6 +44,10 @@ FLIGHTS: dict[str, dict[str, Any]] = {
     "df_bitstar": {**ROOMS, "planner": "df_bitstar", "controller": "flatness"},
     "bitstar": {**COLUMNS, "planner": "bitstar", "world_seed": 5},
     "explore": {**ROOMS, "mission": "explore", "world.size_m": [6.0, 4.5, 2.6], "mission.time_base_s": 20.0},
+    "frontier_3d": {
+        "world": "multilevel", "strategy": "safe", "explorer": "frontier_3d", "world.storeys": 2,
+        "world.size_m": [7.0, 6.06, 4.3], "world.racks": 1,
+    },
     "inspect": {
         **ROOMS, "strategy": "inspect", "mission.blocks": 1, "world.size_m": [6.0, 4.6, 2.6],
         "mission.time_base_s": 10.0, "mission.time_per_viewpoint_s": 0.0, "mission.time_per_path_spm": 0.0,

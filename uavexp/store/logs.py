@@ -39,8 +39,8 @@ _DAMAGE = (
     OSError, ValueError, KeyError, EOFError, MemoryError, NotImplementedError, RuntimeError, TypeError,
     SyntaxError, zipfile.BadZipFile, zlib.error, struct.error,
 )  # fmt: skip  # what unpacking a bad file raises
-_LATER = ("track_swerve_m",)  # added since: left out while empty, so that digests without it stay
-_LEFT_OUT = ("seen_so_far",)  # of logs in which it is empty: most flights have a target
+# added since: left out while empty, so that digests without them stay
+_LATER = ("track_swerve_m", "seen_so_far")
 _RAGGED = ("changed_m", "trajectory_m")  # (n, 3) per replan, n differing
 
 
