@@ -11,6 +11,8 @@ from uavexp.arrays import Float, Int
 from uavexp.errors import RecordError
 
 _LONG_GAPS = 10.0  # times the usual time between positions: told
+_LONGEST_S = 5.0  # usually between positions; beyond it they are no seconds, or no flight
+_MOST_ROWS = 2_000_000  # even steps from the first position to the last
 _NED_TO_ENU = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 _FRD_TO_FLU = np.diag([1.0, -1.0, -1.0])
 
@@ -65,6 +67,13 @@ def checked(recording: Recording) -> Recording:
     left_out = int(np.count_nonzero(~there))
     notes = [f"{left_out} samples without a position are left out"] if left_out else []
     usual_s, longest = float(np.median(step_s)), int(step_s.argmax())
+    if usual_s > _LONGEST_S:
+        raise RecordError(f"{where}: positions are {usual_s:.3g} s apart; are its times seconds?")
+    if (track.time_s[-1] - track.time_s[0]) / usual_s > _MOST_ROWS:
+        raise RecordError(
+            f"{where}: stamps leap by {step_s[longest]:.3g} s at position {longest + 1}, too long for one flight; "
+            "cut the recording"
+        )
     if step_s[longest] > _LONG_GAPS * usual_s:
         begin_s = track.time_s[longest] - track.time_s[0]
         notes.append(f"no position for {step_s[longest]:.2f} s from {begin_s:.1f} s on, bridged straight")

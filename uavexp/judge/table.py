@@ -18,6 +18,7 @@ from uavexp.judge.recording import Plan, Recording, Track
 
 _TIME = re.compile(r"(?:time|timestamp|stamp|t)[ _]*\[?(s|ms|us|ns)?\]?")
 _SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_SINCE_1970 = {"ns": 1e17, "us": 1e14, "ms": 1e11}
 _POSITIONS = ("position_{}_m", "position_{}", "p_rs_r_{} [m]", "pose.position.{}", "position.{}",
               "pose.pose.position.{}", "p{}", "pos_{}", "t{}", "{}_m", "{}")  # fmt: skip
 _VELOCITIES = ("velocity_{}_mps", "velocity_{}", "v_rs_r_{} [m s^-1]", "v{}", "vel_{}")
@@ -47,8 +48,8 @@ def read(path: Path, topic: str | None) -> Recording:
             f"{path}: no position over time: no columns of {lacking}; it has {', '.join(names)[:200]}"
         )
     match = _TIME.fullmatch(time)
-    unit_s = _SECONDS[(match[1] if match else None) or "s"]
     time_s = _numbers(path, rows, [number[time]])[:, 0]
+    unit_s = _SECONDS[(match[1] if match else None) or _clock(time_s)]
     time_s = (time_s - time_s[0]) * unit_s if len(time_s) else time_s  # nanoseconds since 1970 lose digits
 
     def track(known: tuple[str, ...], axes: str) -> Track | None:
@@ -64,6 +65,12 @@ def read(path: Path, topic: str | None) -> Recording:
         reference_m=track(_REFERENCES, "xyz"),
         plans=_plans(number, rows, time_s),
     )
+
+
+def _clock(times: Float) -> str:
+    """The unit of a clock that counts since 1970, by its digits; of any other seconds."""
+    latest = float(np.nanmax(times, initial=0.0))
+    return next((unit for unit, least in _SINCE_1970.items() if latest > least), "s")
 
 
 def _cells(path: Path) -> tuple[list[str], list[list[str]]]:

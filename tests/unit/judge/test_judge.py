@@ -149,6 +149,7 @@ def test_a_body_that_looks_north_looks_along_y():
     [
         ("#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m],p_RS_R_z [m]", "{:.0f}000000,{},{},{}"),
         ("t_ms;X;Y;Z", "{:.0f};{};{};{}"),
+        ("timestamp,x,y,z", "1700000{:06.0f},{},{},{}"),
     ],
 )
 def test_other_peoples_headers_are_understood(header, text, tmp_path, capsys):
@@ -166,6 +167,8 @@ def test_other_peoples_headers_are_understood(header, text, tmp_path, capsys):
     [
         ([0.0, 0.1, 0.1, 0.2], "stamps must increase, position 2 has 0.100000 s twice"),
         ([0.0, 0.2, 0.1, 0.3], "stamps must increase, position 2 has 0.100000 s after 0.200000 s"),
+        ([0.0, 0.02, 0.04, 1.7e9], "stamps leap by 1.7e+09 s at position 3"),
+        ([0.0, 1e5, 2e5, 3e5], "positions are 1e+05 s apart; are its times seconds?"),
         ([0.0], "a flight needs at least 2"),
         ([], "a flight needs at least 2"),
     ],
