@@ -100,3 +100,67 @@ def ros_bag(
             for connection in connections:
                 bag.write(connection, number * 20_000_000, data)
     return file
+
+
+def depth_bag(
+    file: Path, kind: str, encoding: str, images, camera: np.ndarray, places_m, step_s: float
+) -> Path:
+    """A bag of depth images in mm or m, their camera_info, and odometry of a vehicle that looks along x."""
+    from rosbags.rosbag1 import Writer as Writer1
+    from rosbags.rosbag2 import StoragePlugin
+    from rosbags.rosbag2 import Writer as Writer2
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS1_NOETIC if kind == "bag" else Stores.ROS2_HUMBLE)
+    types = store.types
+    sequence = {"seq": 0} if kind == "bag" else {}
+    letters = "DKRP" if kind == "bag" else "dkrp"
+    topics = {
+        "/camera/depth/image": "sensor_msgs/msg/Image",
+        "/camera/depth/camera_info": "sensor_msgs/msg/CameraInfo",
+        "/odom": "nav_msgs/msg/Odometry",
+    }
+
+    def point(name: str, values) -> object:
+        return types[f"geometry_msgs/msg/{name}"](*map(float, values))
+
+    writer = Writer1(file) if kind == "bag" else Writer2(file, version=8, storage_plugin=StoragePlugin.MCAP)
+    with writer as bag:
+        connections = {
+            topic: bag.add_connection(topic, name, typestore=store) for topic, name in topics.items()
+        }
+        for number, (image, place) in enumerate(zip(images, places_m, strict=True)):
+            time_ns = round(step_s * 1e9) * number + 7_000_000_000
+            stamp = types["builtin_interfaces/msg/Time"](*divmod(time_ns, 1_000_000_000))
+            header = types["std_msgs/msg/Header"](stamp=stamp, frame_id="map", **sequence)
+            raw = image if encoding == "16UC1" else np.where(image > 0, image / 1000.0, np.nan).astype("<f4")
+            data = np.frombuffer(np.ascontiguousarray(raw).tobytes(), dtype=np.uint8)
+            height, width = image.shape
+            region = types["sensor_msgs/msg/RegionOfInterest"](0, 0, 0, 0, False)
+            matrices = [np.zeros(5), camera.ravel(), np.eye(3).ravel(), np.zeros(12)]
+            pose = types["geometry_msgs/msg/Pose"](
+                position=point("Point", place), orientation=point("Quaternion", (0, 0, 0, 1))
+            )
+            twist = types["geometry_msgs/msg/Twist"](
+                linear=point("Vector3", (1, 0, 0)), angular=point("Vector3", (0, 0, 0))
+            )
+            no = np.zeros(36)
+            said = {
+                "/camera/depth/image": types["sensor_msgs/msg/Image"](
+                    header=header, height=height, width=width, encoding=encoding, is_bigendian=0,
+                    step=width * raw.itemsize, data=data,
+                ),
+                "/camera/depth/camera_info": types["sensor_msgs/msg/CameraInfo"](
+                    header=header, height=height, width=width, distortion_model="", binning_x=0, binning_y=0,
+                    roi=region, **dict(zip(letters, matrices, strict=True)),
+                ),
+                "/odom": types["nav_msgs/msg/Odometry"](
+                    header=header, child_frame_id="base_link",
+                    pose=types["geometry_msgs/msg/PoseWithCovariance"](pose=pose, covariance=no),
+                    twist=types["geometry_msgs/msg/TwistWithCovariance"](twist=twist, covariance=no),
+                ),
+            }  # fmt: skip
+            for topic, message in said.items():
+                write = store.serialize_ros1 if kind == "bag" else store.serialize_cdr
+                bag.write(connections[topic], time_ns, write(message, topics[topic]))
+    return file

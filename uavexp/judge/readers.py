@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -58,16 +60,31 @@ def read(path: Path, topic: str | None = None) -> Recording:
         module = import_module(f"uavexp.judge.{wanted.module}")
     except ImportError as error:
         raise ConfigError(f"{path} needs {wanted.package} ({error}): pip install {wanted.package}") from error
-    try:
+    with told(path, wanted.what):
         recording: Recording = module.read(path, topic)
+    return checked(recording)
+
+
+@contextlib.contextmanager
+def told(path: Path, what: str) -> Iterator[None]:
+    """Tell in one line what a damaged file does to readers that are other people's, and raise what they like.
+
+    Args:
+        path: of the file.
+        what: it should be.
+
+    Raises:
+        RecordError: in place of anything that was no `UavexpError`.
+    """
+    try:
+        yield
     except UavexpError:
         raise
     except OSError as error:
         raise RecordError(f"{path}: cannot be read ({error.strerror or error})") from error
-    except Exception as error:  # the readers are other people's, and what a damaged file does to them is open
+    except Exception as error:
         said = one_line(error) or type(error).__name__
-        raise RecordError(f"{path}: damaged, or not {wanted.what} ({said[:200]})") from error
-    return checked(recording)
+        raise RecordError(f"{path}: damaged, or not {what} ({said[:200]})") from error
 
 
 def _is_ros(path: Path) -> bool:

@@ -71,8 +71,8 @@ def checked(recording: Recording) -> Recording:
         raise RecordError(f"{where}: positions are {usual_s:.3g} s apart; are its times seconds?")
     if (track.time_s[-1] - track.time_s[0]) / usual_s > _MOST_ROWS:
         raise RecordError(
-            f"{where}: stamps leap by {step_s[longest]:.3g} s at position {longest + 1}, too long for one flight; "
-            "cut the recording"
+            f"{where}: stamps leap by {step_s[longest]:.3g} s at position {longest + 1}, too long for one "
+            "flight; cut the recording"
         )
     if step_s[longest] > _LONG_GAPS * usual_s:
         begin_s = track.time_s[longest] - track.time_s[0]

@@ -50,7 +50,7 @@ def read(path: Path, topic: str | None) -> Recording:
         kinds = {connection.topic: connection.msgtype for connection in bag.connections}
         wanted, frame = topic_of(path, kinds, POSITIONS, topic)
         kind, source = kinds[wanted], wanted
-        stamped = list(_messages(bag, wanted))
+        stamped = list(messages_of(bag, wanted))
         plans = _plans(bag, kinds)
     if kind == _TRANSFORMS:
         parts = [(time_ns, part) for time_ns, message in stamped for part in message.transforms]
@@ -58,18 +58,18 @@ def read(path: Path, topic: str | None) -> Recording:
         stamped = [(time_ns, part) for time_ns, part in parts if part.child_frame_id == frame]
         source = f"{wanted}:{frame}"
     return recording_of(
-        path, source, _stamps_s(stamped), [POSITIONS[kind](message) for _, message in stamped], plans
+        path, source, stamps_s(stamped), [POSITIONS[kind](message) for _, message in stamped], plans
     )
 
 
-def _messages(bag: AnyReader, topic: str) -> Iterator[tuple[int, Any]]:
+def messages_of(bag: AnyReader, topic: str) -> Iterator[tuple[int, Any]]:
     """Time of the bag, ns, and message of a topic, in order."""
     connections = [connection for connection in bag.connections if connection.topic == topic]
     for connection, time_ns, raw in bag.messages(connections=connections):
         yield time_ns, bag.deserialize(raw, connection.msgtype)
 
 
-def _stamps_s(stamped: Sequence[tuple[int, Any]]) -> Float:
+def stamps_s(stamped: Sequence[tuple[int, Any]]) -> Float:
     """Of the headers; of the bag where there are none, or nobody filled them in."""
     said_ns = [_said_ns(message) for _, message in stamped]
     return 1e-9 * np.array(said_ns if any(said_ns) else [time_ns for time_ns, _ in stamped], dtype=np.float64)
@@ -88,12 +88,12 @@ def _plans(bag: AnyReader, kinds: Mapping[str, str]) -> tuple[Plan, ...] | None:
     topics = [topic for topic in topics if "plan" in topic] or topics
     if len(topics) != 1:
         return None
-    stamped = list(_messages(bag, topics[0]))
+    stamped = list(messages_of(bag, topics[0]))
     plans = [
         Plan(
             time_s=time_s,
             path_m=np.array([xyz(item.pose.position) for item in message.poses]).reshape(-1, 3),
         )
-        for time_s, (_, message) in zip(_stamps_s(stamped).tolist(), stamped, strict=True)
+        for time_s, (_, message) in zip(stamps_s(stamped).tolist(), stamped, strict=True)
     ]
     return new_paths([plan for plan in plans if len(plan.path_m)])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import csv
 import io
+import math
 import os
 import sys
 from collections import Counter
@@ -15,10 +16,11 @@ from typing import NoReturn
 from uavexp.config.composition import CELL_AXIS, Composer
 from uavexp.config.options import user_folder
 from uavexp.config.overrides import parse_settings
-from uavexp.errors import ConfigError
+from uavexp.errors import ConfigError, RecordError
 from uavexp.interrupts import exit_code_of, leave_at_once
+from uavexp.judge.readers import told
 from uavexp.replay.asked import Asked, asked
-from uavexp.replay.frames import Reading, Recorded, read
+from uavexp.replay.recorded import Reading, Recorded
 from uavexp.store.records import write_bytes
 
 _NO_PART = ("seed", "out", "experiments", "experiment", "world", "mission", "movers")
@@ -47,10 +49,21 @@ def _replay(arguments: Sequence[str]) -> int:
         raise ConfigError("--rate and --unit must be > 0, --stride at least 1")
     folder = None if options.config_dir is None else user_folder(options.config_dir)
     command = Composer(user_folder=folder).command(parse_settings(options.overrides))
-    reading = Reading(rate_hz=options.rate, unit_m=options.unit, stride=options.stride, up=tuple(options.up))
-    recorded = read(options.folder, reading)
+    *mount_m, pitch_deg = options.mount
+    reading = Reading(
+        rate_hz=options.rate,
+        unit_m=options.unit,
+        stride=options.stride,
+        up=tuple(options.up),
+        images=options.images,
+        poses=options.poses,
+        mount_m=(mount_m[0], mount_m[1], mount_m[2]),
+        mount_pitch_rad=math.radians(pitch_deg),
+    )
+    recorded = _read(options.folder, reading)
     found = [asked(recorded, cell, cell.labels[CELL_AXIS]) for cell in command.cells]
-    stem = options.folder.resolve().name
+    place = options.folder.resolve()
+    stem = place.name if place.is_dir() else place.stem
     table, picture = (Path(options.out or ".") / f"{stem}.replay.{kind}" for kind in ("csv", "png"))
     table.parent.mkdir(parents=True, exist_ok=True)
     write_bytes(table, _table(found).encode())
@@ -58,6 +71,22 @@ def _replay(arguments: Sequence[str]) -> int:
     lines = [f"{stem}: {_told(recorded)}", *_lines(found), *(f"note: {note}" for note in recorded.notes)]
     sys.stdout.write("\n".join([*lines, f"table:   {table}", f"picture: {picture}"]) + "\n")
     return 0
+
+
+def _read(path: Path, reading: Reading) -> Recorded:
+    """Of a folder of images, or of a bag, which may be a folder, too."""
+    if not path.exists():
+        raise RecordError(f"{path}: there is no such folder of depth images, nor a bag")
+    if path.is_dir() and not (path / "metadata.yaml").is_file():
+        from uavexp.replay import folder
+
+        return folder.read(path, reading)
+    try:
+        from uavexp.replay import bag
+    except ImportError as error:
+        raise ConfigError(f"{path} needs rosbags ({error}): pip install rosbags") from error
+    with told(path, "a ROS bag"):
+        return bag.read(path, reading)
 
 
 def _told(recorded: Recorded) -> str:
@@ -117,7 +146,7 @@ def _parser() -> argparse.ArgumentParser:
         "folder",
         type=Path,
         metavar="FOLDER",
-        help="poses.txt, intrinsics.txt and depth images, or TUM's form",
+        help="depth images with poses.txt, TUM's form, or a ROS bag",
     )
     parser.add_argument(
         "overrides", nargs="*", metavar="KEY=VALUE", help="strategy=mcr,tbr mapping.voxel_size_m=0.05"
@@ -132,6 +161,15 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--up", type=float, nargs=3, default=(0.0, 0.0, 1.0), metavar=("X", "Y", "Z"),
         help="the recording's axis that points up; 0 0 1",
+    )  # fmt: skip
+    parser.add_argument("--images", metavar="TOPIC", help="a bag's depth images")
+    parser.add_argument(
+        "--poses", metavar="TOPIC", help="a bag's poses of the vehicle; /tf:FRAME of transforms"
+    )
+    parser.add_argument(
+        "--mount", type=float, nargs=4, default=(0.0, 0.0, 0.0, 0.0),
+        metavar=("FORWARD", "LEFT", "UP", "PITCH_DEG"),
+        help="of a bag's camera on its vehicle, m and degrees above its forward axis",
     )  # fmt: skip
     parser.add_argument("--config-dir", metavar="DIR", help="folder of options of your own")
     parser.add_argument("--out", metavar="DIR", help="where table and picture go; here")

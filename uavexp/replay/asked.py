@@ -20,7 +20,7 @@ from uavexp.config.composition import Cell
 from uavexp.errors import require
 from uavexp.geometry import quaternion_from_rotation
 from uavexp.path_clearance import clearance_ahead_m
-from uavexp.replay.frames import Frame, Recorded
+from uavexp.replay.recorded import Frame, Recorded
 from uavexp.scene import Scene
 from uavexp.trajectory import Trajectory, evaluate
 from uavexp.trial import Parts

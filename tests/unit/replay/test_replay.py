@@ -12,6 +12,7 @@ import pytest
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
+from tests import recordings
 from tests.components import build
 from tests.folders import SHARED
 from uavexp.replay import __main__ as command
@@ -71,9 +72,10 @@ def requests(folder: Path, out: Path, *words: object) -> dict[str, list[dict[str
     typed = ["--rate", RATE_HZ, "--stride", 1, "sensor.max_range_m=3", "mapping.voxel_size_m=0.1", *words]
     assert command.main([str(folder), *map(str, typed), "--out", str(out)]) == 0
     found: dict[str, list[dict[str, str]]] = {}
-    for row in csv.DictReader((out / f"{folder.name}.replay.csv").open()):
+    (table,), (picture,) = out.glob("*.replay.csv"), out.glob("*.replay.png")
+    for row in csv.DictReader(table.open()):
         found.setdefault(row["policy"], []).append(row)
-    assert (out / f"{folder.name}.replay.png").stat().st_size > 5000
+    assert picture.stat().st_size > 5000
     return found
 
 
@@ -136,6 +138,32 @@ def test_tums_form_tells_the_same(recorded, asked, tmp_path):
     found = requests(tum, tmp_path, "strategy=mcr,ssp", "explorer=target_only", "--unit", 0.001)
     times = [float(row["time_s"]) for row in found["mcr"]]
     assert times == pytest.approx([float(row["time_s"]) for row in asked["mcr"]], abs=1e-3)
+
+
+@pytest.mark.parametrize(("kind", "encoding"), [("bag", "16UC1"), ("mcap", "32FC1")])
+def test_a_bag_of_a_vehicle_that_carries_the_camera_tells_the_same(kind, encoding, recorded, asked, tmp_path):
+    folder, rows = recorded
+    mount_m = np.array([0.1, 0.0, 0.05])  # of the camera on the vehicle
+    images = [np.asarray(Image.open(folder / f"{frame:06d}.depth.png")) for frame, _, _ in rows]
+    camera = np.loadtxt(folder / "intrinsics.txt")
+    places_m = [place - mount_m for _, place, _ in rows]
+    bag = recordings.depth_bag(
+        tmp_path / f"carried.{kind}", kind, encoding, images, camera, places_m, 1.0 / RATE_HZ
+    )
+    words = ("strategy=mcr,ssp", "explorer=target_only", "--mount", *mount_m, 0)
+    found = requests(bag, tmp_path, *words)
+    times = [float(row["time_s"]) for row in found["mcr"]]
+    assert times == pytest.approx([float(row["time_s"]) for row in asked["mcr"]], abs=1e-3)
+
+
+def test_a_bag_without_depth_is_one_line(tmp_path, capsys):
+    time_s, position_m, _ = recordings.circle()
+    bag = recordings.ros_bag(tmp_path / "poses.bag", "bag", time_s, position_m)
+    assert command.main([str(bag)]) == 2
+    assert "no topic of sensor_msgs/msg/Image" in capsys.readouterr().err
+    bag.write_bytes(bag.read_bytes()[:5000])
+    assert command.main([str(bag)]) == 2
+    assert "damaged, or not a ROS bag" in capsys.readouterr().err
 
 
 def damaged(folder: Path, what: str) -> None:

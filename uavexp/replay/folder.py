@@ -8,7 +8,7 @@ camera-to-world matrix, 3 x 4, by row), `NNNNNN.depth.png` in mm. TUM's RGB-D be
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,71 +16,14 @@ from PIL import Image, UnidentifiedImageError
 from scipy.spatial.transform import Rotation
 
 from uavexp.arrays import Float, Float32
-from uavexp.errors import ConfigError, RecordError
-from uavexp.scan import DepthScan
+from uavexp.errors import RecordError
+from uavexp.replay.recorded import Frame, Reading, Recorded, recorded_of, thinned
 
 INTRINSICS, POSES, DEPTH, TRUTH = "intrinsics.txt", "poses.txt", "depth.txt", "groundtruth.txt"
+_UNIT_M, _TUMS_UNIT_M = 0.001, 0.0002
 _NOT_MEASURED = (0, 65535)
 _SAME_S = 0.02  # a pose this near an image is its pose, as TUM's own tools have it
 _ROTATION_IS = 0.02  # printed digits are few, but a matrix farther from a rotation is none
-_BODY_FROM_CAMERA = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Reading:
-    """What the files do not say."""
-
-    rate_hz: float = 30.0  # of numbered frames
-    unit_m: float | None = None  # of a depth value; None: 0.001 of ours, 0.0002 of TUM's
-    stride: int = 4  # every so many pixels along both axes
-    up: tuple[float, float, float] = (0.0, 0.0, 1.0)  # the recording's axis that points up
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Frame:
-    """One image and the pose of its camera, z up."""
-
-    time_s: float  # since the first
-    file: Path
-    position_m: Float  # (3,)
-    rotation: Float  # (3, 3) camera to world
-
-    @property
-    def body_rotation(self) -> Float:
-        """Body (forward, left, up) to world of a body that looks as the camera does (3, 3)."""
-        return np.asarray(self.rotation @ _BODY_FROM_CAMERA.T)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Recorded:
-    """A recording: its images are read when asked for."""
-
-    folder: Path
-    frames: tuple[Frame, ...]  # at least 2, by time
-    camera: Float  # (3, 3)
-    unit_m: float
-    stride: int
-    notes: tuple[str, ...]
-
-    def scan(self, frame: Frame, max_range_m: float) -> DepthScan:
-        """The image of a frame as the map takes it; what is farther was measured to lie beyond.
-
-        Raises:
-            RecordError: it is no depth image, or damaged.
-        """
-        step = self.stride
-        raw = _image(frame.file)[step // 2 :: step, step // 2 :: step]
-        depth_m = np.where(np.isin(raw, _NOT_MEASURED), np.nan, raw * self.unit_m)
-        cx, cy = ((self.camera[axis, 2] - step // 2) / step for axis in (0, 1))
-        return DepthScan(
-            time_s=frame.time_s,
-            depth_m=np.where(depth_m > max_range_m, np.inf, depth_m).astype(np.float32),
-            focal_px=(self.camera[0, 0] / step, self.camera[1, 1] / step),
-            centre_px=(cx, cy),
-            max_range_m=max_range_m,
-            camera_position_m=frame.position_m,
-            camera_rotation=frame.rotation,
-        )
 
 
 def read(folder: Path, reading: Reading) -> Recorded:
@@ -90,52 +33,38 @@ def read(folder: Path, reading: Reading) -> Recorded:
         RecordError: a file is missing or damaged, or the recording is no sequence.
         ConfigError: `up` is no direction.
     """
-    if not folder.is_dir():
-        raise RecordError(f"{folder}: there is no such folder of depth images")
     if (folder / POSES).is_file():
-        found, unit_m = _numbered(folder, reading.rate_hz), 0.001
+        frames, notes = _numbered(folder, reading)
     elif (folder / DEPTH).is_file() and (folder / TRUTH).is_file():
-        found, unit_m = _tum(folder), 0.0002
+        frames, notes = _tum(folder, reading)
     else:
         raise RecordError(f"{folder} holds neither {POSES} nor TUM's {DEPTH} and {TRUTH}")
-    rows, notes = found
-    if len(rows) < 2:
-        raise RecordError(f"{folder}: {len(rows)} depth images with a pose, at least 2 are needed")
-    begin_s = rows[0][0]
-    turn = _upright(reading.up)
-    return Recorded(
-        folder=folder,
-        frames=tuple(
-            Frame(time_s=time_s - begin_s, file=file, position_m=turn @ position, rotation=turn @ rotation)
-            for time_s, file, position, rotation in rows
-        ),
-        camera=_camera(folder),
-        unit_m=reading.unit_m or unit_m,
-        stride=reading.stride,
-        notes=notes,
-    )
+    return recorded_of(folder, frames, _camera(folder), reading, notes)
 
 
-_Rows = tuple[
-    list[tuple[float, Path, Float, Float]], tuple[str, ...]
-]  # time, image, position, rotation; notes
-
-
-def _numbered(folder: Path, rate_hz: float) -> _Rows:
+def _numbered(folder: Path, reading: Reading) -> tuple[list[Frame], tuple[str, ...]]:
     table = _table(folder / POSES, 13)
     _check_order(folder / POSES, table[:, 0], "frame")
-    rows, lacking = [], 0
+    depth_m = partial(_depth_m, unit_m=reading.unit_m or _UNIT_M, stride=reading.stride)
+    frames, lacking = [], 0
     for row in table:
         file = folder / f"{int(row[0]):06d}.depth.png"
         pose = row[1:].reshape(3, 4)
         if file.is_file():
-            rows.append((float(row[0]) / rate_hz, file, pose[:, 3], _rotation(folder / POSES, pose[:, :3])))
+            rotation = _rotation(folder / POSES, pose[:, :3])
+            frame = Frame(
+                time_s=float(row[0]) / reading.rate_hz,
+                position_m=pose[:, 3],
+                rotation=rotation,
+                depth_m=partial(depth_m, file),
+            )
+            frames.append(frame)
         lacking += not file.is_file()
     notes = (f"{lacking} poses have no depth image",) if lacking else ()
-    return rows, (f"frames are numbered: taken for {rate_hz:g} a second (--rate)", *notes)
+    return frames, (f"frames are numbered: taken for {reading.rate_hz:g} a second (--rate)", *notes)
 
 
-def _tum(folder: Path) -> _Rows:
+def _tum(folder: Path, reading: Reading) -> tuple[list[Frame], tuple[str, ...]]:
     poses = _table(folder / TRUTH, 8)
     _check_order(folder / TRUTH, poses[:, 0], "stamp")
     images = [words for words in _lines(folder / DEPTH) if len(words) >= 2]
@@ -144,15 +73,22 @@ def _tum(folder: Path) -> _Rows:
     except ValueError as error:
         raise RecordError(f"{folder / DEPTH}: {error}") from error
     _check_order(folder / DEPTH, stamps, "stamp")
-    rows, alone = [], 0
+    depth_m = partial(_depth_m, unit_m=reading.unit_m or _TUMS_UNIT_M, stride=reading.stride)
+    frames, alone = [], 0
     for time_s, words in zip(stamps.tolist(), images, strict=True):
         nearest = int(np.abs(poses[:, 0] - time_s).argmin())
         if abs(float(poses[nearest, 0]) - time_s) > _SAME_S:
             alone += 1
             continue
         rotation = _of_quaternion(folder / TRUTH, poses[nearest, 4:])
-        rows.append((time_s, folder / words[1], poses[nearest, 1:4], rotation))
-    return rows, (f"{alone} images have no pose within {_SAME_S:g} s and are left out",) if alone else ()
+        frame = Frame(
+            time_s=time_s,
+            position_m=poses[nearest, 1:4],
+            rotation=rotation,
+            depth_m=partial(depth_m, folder / words[1]),
+        )
+        frames.append(frame)
+    return frames, (f"{alone} images have no pose within {_SAME_S:g} s and are left out",) if alone else ()
 
 
 def _lines(file: Path) -> list[list[str]]:
@@ -209,16 +145,8 @@ def _camera(folder: Path) -> Float:
     return camera
 
 
-def _upright(up: tuple[float, float, float]) -> Float:
-    """The least rotation (3, 3) that turns a direction to +z."""
-    length = float(np.linalg.norm(up))
-    if not length > 0.0:
-        raise ConfigError(f"--up must be a direction, got {' '.join(map(str, up))}")
-    turn, _ = Rotation.align_vectors([[0.0, 0.0, 1.0]], [np.array(up) / length])
-    return np.asarray(turn.as_matrix())
-
-
-def _image(file: Path) -> Float32:
+def _depth_m(file: Path, unit_m: float, stride: int) -> Float32:
+    """The image of a file, thinned; NaN where it was not measured."""
     try:
         with Image.open(file) as image:
             pixels = np.asarray(image)
@@ -226,4 +154,5 @@ def _image(file: Path) -> Float32:
         raise RecordError(f"{file}: no depth image, or damaged ({error})") from error
     if pixels.ndim != 2:
         raise RecordError(f"{file}: a depth image has one channel, this one is {pixels.shape}")
-    return pixels.astype(np.float32)
+    raw = thinned(pixels, stride)
+    return np.where(np.isin(raw, _NOT_MEASURED), np.nan, raw * unit_m).astype(np.float32)
