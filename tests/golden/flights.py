@@ -39,6 +39,9 @@ FLIGHTS: dict[str, dict[str, Any]] = {
     "distance": {**COLUMNS, "strategy": "distance", "sensor": "lidar_rosette", "planner": "astar"},
     "expiry": {**COLUMNS, "strategy": "expiry", "mapping": "known", "planner": "rrtstar"},
     "risk": {**COLUMNS, **FOUR_MOVERS, "strategy": "risk", "planner": "improved_astar"},
+    "people": {
+        **COLUMNS, **FOUR_MOVERS, "strategy": "risk", "movers.reaction": "social", "detection.estimate": "imm",
+    },
     "bspline_qp": {**COLUMNS, **FOUR_MOVERS, "planner": "bspline_qp", "detection": "noisy"},
     "bspline_mpc": {**COLUMNS, **FOUR_MOVERS, "strategy": "bspline_mpc", "detection": "truth"},
     "df_bitstar": {**ROOMS, "planner": "df_bitstar", "controller": "flatness"},
