@@ -40,7 +40,8 @@ FLIGHTS: dict[str, dict[str, Any]] = {
     "expiry": {**COLUMNS, "strategy": "expiry", "mapping": "known", "planner": "rrtstar"},
     "risk": {**COLUMNS, **FOUR_MOVERS, "strategy": "risk", "planner": "improved_astar"},
     "people": {
-        **COLUMNS, **FOUR_MOVERS, "strategy": "risk", "movers.reaction": "social", "detection.estimate": "imm",
+        **COLUMNS, **FOUR_MOVERS, "strategy": "risk", "movers.reaction": "social",
+        "detection.estimate": "imm",
     },
     "bspline_qp": {**COLUMNS, **FOUR_MOVERS, "planner": "bspline_qp", "detection": "noisy"},
     "bspline_mpc": {**COLUMNS, **FOUR_MOVERS, "strategy": "bspline_mpc", "detection": "truth"},

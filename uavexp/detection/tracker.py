@@ -1,7 +1,7 @@
 """Clusters over time: association, birth, confirmation, coasting and death of tracks.
 
-Association is global nearest neighbour: the assignment of least total Mahalanobis distance
-squared, nothing beyond the gate (Bar-Shalom, Li and Kirubarajan 2001). What a track observes
+Association is global nearest neighbour: the assignment of greatest likelihood, nothing beyond the
+gate (Bar-Shalom, Li and Kirubarajan 2001). What a track observes
 is the centre of its whole body, not of the part in sight (`centres_m`).
 
 A confirmed track that no cluster fits may have turned: what its speed would let it reach is its own
@@ -173,8 +173,9 @@ class Tracker:
     ) -> tuple[Int, dict[int, tuple[int, Float]]]:
         """Index of the track that each cluster (K,) belongs to, -1: to none; each track's cluster and centre.
 
-        The assignment first; then confirmed tracks that fit none take what is left and near enough to where
-        they were last seen; then clusters inside the predicted box of a track are more of the same body.
+        The assignment first; then confirmed tracks that fit none take what is left, near enough to where
+        they were last seen and no piece of a body just assigned; then clusters inside the predicted box of a
+        track are more of the same body.
         """
         owner = np.full(len(clusters), -1)
         if not (self.tracks and len(clusters)):
@@ -183,19 +184,26 @@ class Tracker:
         known_m = np.stack([track.half_size_m for track in self.tracks])[:, None]
         seen_m = centres_m(clusters, np.maximum(known_m, half_m), predicted_m, sensor_m)  # (T, K, 3)
         apart_m = seen_m - predicted_m
-        gates = np.linalg.inv(np.stack([track.filter.innovation_covariance for track in self.tracks]))
-        squared = ((apart_m @ gates) * apart_m).sum(axis=2)
-        cost = np.where(squared <= self.rule.gate**2, squared, _FAR)
+        spread = np.stack([track.filter.innovation_covariance for track in self.tracks])
+        squared = ((apart_m @ np.linalg.inv(spread)) * apart_m).sum(axis=2)
+        unlikely = squared + np.linalg.slogdet(spread)[1][:, None]  # -2 log likelihood: or the lost win all
+        cost = np.where(squared <= self.rule.gate**2, unlikely, _FAR)
         pairs = _assigned(cost)
         from_m = np.stack([track.filter.seen_m for track in self.tracks])[:, None]
         turned_m = np.linalg.norm(seen_m - from_m, axis=2)
         free = np.isin(np.arange(len(self.tracks)), [t for t, _ in pairs], invert=True)[:, None]
         free = free & np.isin(np.arange(len(clusters)), [k for _, k in pairs], invert=True)
+        middle_m = 0.5 * (clusters.low_m + clusters.high_m)
+        apart_m = np.abs(middle_m - predicted_m)
+        noise_m = _NOISES * self.rule.motion.position_noise_m
+        in_box: Bool = np.asarray((apart_m <= known_m + noise_m).all(axis=2))
+        free = free & ~in_box[[t for t, _ in pairs]].any(
+            axis=0
+        )  # another piece of a body that has been seen is nobody's turn
         pairs += _assigned(np.where(free & (turned_m <= self._reach_m(period_s)[:, None]), turned_m, _FAR))
         for t, k in pairs:
             owner[k] = t
-        middle_m = 0.5 * (clusters.low_m + clusters.high_m)
-        inside: Bool = np.asarray((np.abs(middle_m - predicted_m) <= known_m).all(axis=2))
+        inside: Bool = np.asarray((apart_m <= known_m).all(axis=2))
         more = (owner < 0) & inside.any(axis=0)
         owner[more] = np.argmax(inside[:, more], axis=0)
         return owner, {t: (k, seen_m[t, k]) for t, k in pairs}

@@ -14,7 +14,7 @@ import numpy as np
 from uavexp.arrays import Float
 from uavexp.geometry import wrap_angle
 from uavexp.pace import evaluate_paced
-from uavexp.pilot.heading import bearing_rad, glanced_rad, rate_to
+from uavexp.pilot.heading import bearing_rad, free_glance_rad, glanced_rad, rate_to
 from uavexp.trajectory import evaluate_pieces
 from uavexp.types import Reference
 
@@ -49,7 +49,7 @@ def follow(
         most_radps: fastest turn.
         step_s: of a step.
         glance_rad: bearing of whom to look at on the way; NaN: nobody.
-        most_glance_rad: by which the yaw leaves the way for it at most.
+        most_glance_rad: by which the yaw leaves the way for it at most, but where the flight is slow.
     """
     now_s, position, velocity, acceleration, jerk = evaluate_paced(breaks_s, coefficients, pace, times_s)
     ahead_s = np.minimum(np.maximum(now_s, moves_s) + lookahead_s, np.maximum(now_s, breaks_s[-1]))
@@ -59,7 +59,8 @@ def follow(
     for n in range(len(times_s)):
         bearing = bearing_rad(wanted_rad, ahead[n])
         if math.isnan(wanted_rad) and not math.isnan(glance_rad):
-            bearing = glanced_rad(bearing, glance_rad, most_glance_rad)
+            speed_mps = math.sqrt((velocity[n] ** 2).sum())
+            bearing = glanced_rad(bearing, glance_rad, max(most_glance_rad, free_glance_rad(speed_mps)))
         if not math.isnan(bearing):
             rows[n, 10] = rate_to(bearing, yaw_rad, most_radps)
             yaw_rad = wrap_angle(yaw_rad + rows[n, 10] * step_s)

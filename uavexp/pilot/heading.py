@@ -14,6 +14,7 @@ from uavexp.types import Limits
 
 _AHEAD_M = 0.1  # a shorter way ahead has no direction
 _CORNER_M = 0.02  # kept between the turning body and what is mapped
+_SLOW_MPS = 1.0  # from here on the way has to be seen
 _GAIN_PER_S = 4.0  # from yaw error to yaw rate
 
 
@@ -34,6 +35,12 @@ def glanced_rad(way_rad: float, glance_rad: float, most_rad: float) -> float:
         return glance_rad
     aside_rad = wrap_angle(glance_rad - way_rad)
     return float(wrap_angle(way_rad + min(max(aside_rad, -most_rad), most_rad)))
+
+
+@nb.njit(cache=True)
+def free_glance_rad(speed_mps: float) -> float:
+    """By how much the yaw may leave the way of a slow flight: who stands need not see where to."""
+    return math.pi * max(1.0 - speed_mps / _SLOW_MPS, 0.0)
 
 
 @nb.njit(cache=True)

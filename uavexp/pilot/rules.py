@@ -32,7 +32,6 @@ class Rules:
     turn_first_rad: NonNegative = 0.6  # rad, from standstill the vehicle turns until it looks this close
     # to its way (4: never) [ours]
     yaw_lookahead_s: NonNegative = 0.8  # s, the yaw looks at the path so far ahead [ours]
-    glance_rad: NonNegative = (
-        0.0  # rad, by which the yaw leaves the way at most, to look at a mover that will
-    )
-    # come near; 0: never. Less than half the view of the sensor, or the way is not seen [ours]
+    glance_rad: NonNegative = 0.0  # rad, by which the yaw leaves the way at most, to look at a mover that
+    # will come near, and all around as the flight comes to a rest; 0: never. Less than half the sensor's
+    # view, or the way is not seen [ours]

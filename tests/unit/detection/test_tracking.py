@@ -329,3 +329,14 @@ def test_flights_without_movers_have_no_such_columns() -> None:
     assert told["mover_contacts"] == 0
     assert told["near_miss_distance_m"] == 0.5
     assert told["prediction_error_1.2s_m"] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_lost_track_that_may_be_anywhere_does_not_take_the_one_that_is_seen() -> None:
+    """It comes, unseen, to where the other is seen 0.2 m off its way: near for it, but less likely."""
+    tracker = Tracker(RULE._replace(coast_s=3.0))
+    follow(tracker, [both(front(4.0, -3.0 + 0.1 * k), front(4.0, 2.0 - 0.05 * k)) for k in range(10)])
+    follow(tracker, [front(4.0, 2.0 - 0.05 * k) for k in range(10, 34)])
+    assert follow(tracker, [front(4.0, 2.0 - 0.05 * 34 + 0.2)]) == [0, 1]
+    lost, seen = tracker.tracks
+    assert lost.unseen_s == pytest.approx(2.5)
+    assert seen.unseen_s == 0.0

@@ -54,8 +54,8 @@ def test_it_looks_at_whom_it_will_meet_first(movers: tuple, bearing_rad: float) 
     assert towards_encounter_rad(met(*movers), along_x()) == pytest.approx(bearing_rad, nan_ok=True)
 
 
-def yaws(glance_rad: float, most_rad: float, wanted_rad: float = math.nan) -> Float:
-    plan, times_s = along_x(), NOW_S + 0.01 * np.arange(200)
+def yaws(glance_rad: float, most_rad: float, wanted_rad: float = math.nan, speed_mps: float = 1.5) -> Float:
+    plan, times_s = along_x(speed_mps), NOW_S + 0.01 * np.arange(200)
     rows = follow(
         plan.breaks_s, plan.coefficients, AS_PLANNED, times_s, NOW_S, 0.8, wanted_rad, 0.0,
         LIMITS.max_body_rate_radps, 0.01, glance_rad, most_rad,
@@ -69,6 +69,11 @@ def test_the_yaw_leaves_the_way_by_no_more_than_it_may() -> None:
     assert yaws(2.0, 0.6)[-1] == pytest.approx(0.6, abs=0.01)
     assert yaws(-2.0, 0.6)[-1] == pytest.approx(-0.6, abs=0.01)
     assert yaws(2.0, 0.6, wanted_rad=1.0)[-1] == pytest.approx(1.0, abs=0.01), "a viewpoint's yaw goes first"
+
+
+def test_a_slow_vehicle_turns_to_who_comes_from_behind() -> None:
+    assert yaws(2.0, 0.6, speed_mps=0.2)[-1] == pytest.approx(2.0, abs=0.05)
+    assert yaws(3.0, 0.6, speed_mps=0.5)[-1] == pytest.approx(0.5 * math.pi, abs=0.05)
 
 
 @pytest.mark.parametrize("glance_rad", [0.0, 0.5])
