@@ -50,7 +50,9 @@ def _by_ending(results: Results, failed: pd.DataFrame) -> str:
 
 def _failed_row(study: Study, item: Mapping[Any, Any]) -> str:
     folder = study.folder / TRIALS / str(item["trial"])
-    command = item.get("wall_command") or read_wall(folder).get("command", "")
+    command = item.get("wall_command")
+    if not isinstance(command, str):  # a table has NaN where there is none
+        command = read_wall(folder).get("command") or ""
     cells = (
         escape(str(item[ARM])),
         escape(str(item[SCENE])),

@@ -9,17 +9,18 @@ alone, then counted as killed; the others go on.
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import importlib
 import logging
 import multiprocessing
 import warnings
-from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
 from functools import partial
 from typing import Any
 
-from uavexp.errors import ConfigError, UavexpError
+from uavexp.errors import ConfigError, UavexpError, one_line
 from uavexp.store.records import Status
 from uavexp.sweep.faults import failure
 from uavexp.sweep.job import Allowance, Answer, Call, Done, Job
@@ -27,7 +28,16 @@ from uavexp.sweep.local import run_local, start_fork_server
 
 _ALLOWED_FAILURES = 1  # workers that one job may take down beyond the first
 _WORKER_MB = 2000  # of a worker itself and its fork server
+_ANSWER_S = 10.0  # a scheduler may take so long to answer, and half of it to have a worker
+_TRIES = 10  # to find a worker
+_PARTING_S = 3.0  # the parting from it
 _LOST = "the Dask cluster was lost; start it again, and the same command flies what is left"
+
+
+class LostError(UavexpError):
+    """The cluster is gone."""
+
+    exit_code = 1  # no fault of what was typed
 
 
 def run_dask(
@@ -62,17 +72,14 @@ def run_dask(
     """
     distributed = _import("distributed")
     with contextlib.ExitStack() as stack:
+        stack.enter_context(_no_logging())
         where = address or stack.enter_context(_cluster(distributed, queue, n_jobs, limits))
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", distributed.versions.VersionMismatchWarning)  # told below
-                client = stack.enter_context(distributed.Client(where, set_as_default=False))
-        except OSError as error:
-            raise ConfigError(f"runner.address={address}: no Dask scheduler answers ({error})") from error
+        client = _client(distributed, where, address)
+        stack.callback(client.close, timeout=_PARTING_S)
         _require_same_versions(client, version)
         fly = partial(client.submit, _run_on_worker, call, limits=limits, preload=tuple(preload), pure=False)
         futures = {fly(job, key=job.name): job for job in jobs}
-        stack.callback(lambda: client.cancel(list(futures)))  # those that have not ended
+        stack.callback(lambda: _cancel(client, list(futures)))  # those that have not ended
         suspects: list[Job] = []
         for future in distributed.as_completed(list(futures), loop=client.loop):
             job = futures.pop(future)
@@ -84,8 +91,64 @@ def run_dask(
                 yield done
         for job in suspects:  # a worker's death is laid to all jobs that it held: now each alone
             future = fly(job, key=f"{job.name} alone")
-            stack.callback(client.cancel, [future])
+            stack.callback(_cancel, client, [future])
             yield _done(job, future) or _killed(job)
+
+
+def _client(distributed: Any, where: Any, address: str | None) -> Any:
+    """Who speaks to a cluster."""
+    if address is not None:
+        _check_scheduler(distributed, address)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", distributed.versions.VersionMismatchWarning)  # told later
+        return distributed.Client(where, set_as_default=False)
+
+
+def _check_scheduler(distributed: Any, address: str) -> None:
+    """Refuse an address where no scheduler answers, or one without workers, in seconds.
+
+    A client of Dask's own waits for ever for who accepts and then says nothing.
+    """
+    try:
+        asyncio.run(asyncio.wait_for(_wait_for_worker(distributed, address), _ANSWER_S))
+    except _NoWorkerError as error:
+        words = f"the scheduler has no worker; start some, dask worker {address}"
+        raise ConfigError(f"runner.address={address}: {words}") from error
+    except Exception as error:  # whatever speaks at that port, it comes out as anything
+        words = one_line(error)[:200] or f"nothing came in {_ANSWER_S:g} s"
+        raise ConfigError(f"runner.address={address}: no Dask scheduler answers ({words})") from error
+
+
+class _NoWorkerError(Exception):
+    """A scheduler answers, and has nobody to fly."""
+
+
+async def _wait_for_worker(distributed: Any, address: str) -> None:
+    arguments = distributed.Security().get_connection_args("client")
+    async with distributed.core.rpc(address, connection_args=arguments) as scheduler:
+        for _ in range(_TRIES):
+            if (await scheduler.identity())["workers"]:
+                return
+            await asyncio.sleep(_ANSWER_S / _TRIES / 2)
+    raise _NoWorkerError
+
+
+def _cancel(client: Any, futures: Sequence[Any]) -> None:
+    """Cancel what has not ended; a cluster that was lost has nothing left to cancel."""
+    if client.status == "running":
+        with contextlib.suppress(Exception):
+            client.cancel(futures)
+
+
+@contextlib.contextmanager
+def _no_logging() -> Iterator[None]:
+    """Nothing of what Dask logs; what matters of it comes back as the end of a job or of the sweep."""
+    before = logging.root.manager.disable
+    logging.disable(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logging.disable(before)
 
 
 def _require_same_versions(client: Any, version: Callable[[], Any] | None) -> None:
@@ -126,7 +189,7 @@ def _done(job: Job, future: Any) -> Done | None:
     try:
         done: Done = future.result()
     except CancelledError as error:
-        raise UavexpError(_LOST) from error
+        raise LostError(_LOST) from error
     except Exception as error:
         if type(error).__name__ == "KilledWorker":
             return None

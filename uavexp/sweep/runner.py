@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import re
 from collections.abc import Mapping
 from enum import StrEnum
 from typing import Annotated, Any
@@ -11,6 +12,8 @@ from typing import Annotated, Any
 from uavexp.errors import require
 from uavexp.parameters import Constraint, Positive, check_value, option, parameter_types
 from uavexp.sweep.job import Allowance
+
+_ADDRESS = re.compile(r"(tcp|tls)://([\w.-]+|\[[0-9a-fA-F:.]+\]):(?P<port>\d{1,5})", re.ASCII)
 
 
 class Backend(StrEnum):
@@ -52,6 +55,12 @@ class Runner:
             )
         if self.backend is not Backend.DASK:
             require(self.address is None and self.queue is None, "runner.address and queue need runner=dask")
+        if self.address is not None:
+            match = _ADDRESS.fullmatch(self.address)
+            require(
+                match is not None and 0 < int(match["port"]) < 65536,
+                f"runner.address must be tcp://HOST:PORT or tls://HOST:PORT, got {self.address[:100]!r}",
+            )
 
     @property
     def workers(self) -> int:
