@@ -21,6 +21,10 @@ run: $(STAMP)
 test: $(STAMP)
 	@$(BIN)/python -m pytest $(ARGS_TEST)
 
+# Commands, flights, folders and kills by chance (hours); fewer: make fuzz ARGS_FUZZ="--flights 100 --kills 0"
+fuzz: $(STAMP)
+	@$(BIN)/python -m tests.fuzz $(ARGS_FUZZ)
+
 check: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .

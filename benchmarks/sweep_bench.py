@@ -17,8 +17,9 @@ from uavexp.config.composition import Composer
 from uavexp.config.overrides import parse_settings
 from uavexp.store.records import Status
 from uavexp.sweep.agenda import agenda_of
+from uavexp.sweep.fork_server import start_fork_server
 from uavexp.sweep.job import Allowance, Job, Progress
-from uavexp.sweep.local import run_local, start_fork_server
+from uavexp.sweep.local import run_local
 from uavexp.sweep.trial_job import TrialJob, fly_job
 
 SEEDS, ROUNDS = "0:8", 3

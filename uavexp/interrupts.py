@@ -1,4 +1,4 @@
-"""How a command ends: bad input, Ctrl-C and SIGTERM are one line and an exit code, at any moment."""
+"""How a command ends: bad input, Ctrl-C, SIGTERM and SIGHUP are one line and an exit code, at any moment."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ _REFUSALS = (
     errno.EAGAIN, errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ENOSPC, errno.EDQUOT, errno.EIO,
     errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS, errno.ESTALE,
 )  # fmt: skip
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)  # SIGTERM would lose the table of what has flown
+# SIGTERM, and SIGHUP of a terminal that closes, would lose the table of what has flown
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def exit_code_of(command: Callable[[], int]) -> int:
@@ -65,7 +66,8 @@ def leave_at_once() -> None:
     library, a class that cannot be made). A job started with & ignores SIGINT: not so here.
     """
     for number in _SIGNALS:
-        signal.signal(number, _leave)
+        if not (number == signal.SIGHUP and signal.getsignal(number) is signal.SIG_IGN):  # under nohup
+            signal.signal(number, _leave)
 
 
 def raise_from_now_on() -> None:

@@ -16,6 +16,7 @@ from uavexp.detection.base import Detection
 from uavexp.errors import require
 from uavexp.estimator.base import Estimator
 from uavexp.explorer.base import Explorer
+from uavexp.finite import finite
 from uavexp.geometry import quaternion_from_yaw
 from uavexp.log import TrialLog
 from uavexp.mapping.base import MapBackend
@@ -43,6 +44,7 @@ from uavexp.world.base import WorldGenerator
 
 Progress = Callable[[float, str], None]  # simulated time s, a few words; NaN: a note of the world
 _LOOK_STEPS = 100  # steps between two looks at whether the vehicle still moves
+_MOST_STEPS = 10_000_000  # of a flight: a day at 0.01 s, and 1.5 GB
 _STILL_M = 0.3  # moved less in `stuck_s`: stuck
 
 
@@ -65,7 +67,7 @@ class Parts:
     mission: Mission
     pilot: Pilot
     world_seed: Whole | None = None  # of the layout alone; None: the trial's seed
-    step_s: Positive = 0.01
+    step_s: Annotated[float, between(1e-4, 0.1)] = 0.01
     latency_s: NonNegative = 0.03
     speed_margin: Annotated[float, between(0, 0.5)] = 0.04
     start_bubble_m: NonNegative = 0.6
@@ -94,6 +96,17 @@ class Parts:
             steps_per(self.step_s, name, 1.0 / rate_hz) for name, rate_hz in self.rates_hz().items()
         )
         return sensor, mapping, explorer
+
+
+def _most_steps(parts: Parts) -> int:
+    """Steps of the longest flight that the mission allows."""
+    limit_s, longest_s = parts.mission.time_limit_s, _MOST_STEPS * parts.step_s
+    require(
+        limit_s <= longest_s,
+        f"the mission allows {limit_s:g} s, at step_s = {parts.step_s:g} s at most {longest_s:g} s can be: "
+        "lower mission.time_base_s or what is added to it",
+    )
+    return math.ceil(limit_s / parts.step_s)
 
 
 def steps_per(step_s: float, name: str, duration_s: float) -> int:
@@ -169,7 +182,7 @@ def fly(parts: Parts, world: World, seed: int, progress: Progress | None = None)
                 seen = see()
                 craft.recorder.tick(seen, pilot.decide(seen))
             judge = flight.judge(see())
-        with watch.lap("fly"):
+        with watch.lap("fly"), finite(motion, time_s):
             ending = motion.fly(step, following, reference, judge)
         if ending is not None:
             return flight.log(ending)
@@ -327,7 +340,7 @@ def _begin(parts: Parts, world: World, seed: int) -> _Flight:
         believe=parts.estimator.begin(generator(seed, Stream.ESTIMATOR)),
         movers=parts.movers,
         contact=ContactTracker(scene=scene, body_size_m=limits.body_size_m),
-        recorder=Recorder(math.ceil(parts.mission.time_limit_s / parts.step_s) + 1, parts.step_s),
+        recorder=Recorder(_most_steps(parts) + 1, parts.step_s),
         step_s=parts.step_s,
         command_steps=steps_per(parts.step_s, "controller.rate_hz", 1.0 / parts.controller.rate_hz),
     )

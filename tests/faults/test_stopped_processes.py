@@ -14,8 +14,9 @@ import pytest
 from tests.jobs import act
 from tests.sweeps import QUICK, begin
 from uavexp.store.records import Status
+from uavexp.sweep.fork_server import start_fork_server
 from uavexp.sweep.job import Allowance, Done, Job
-from uavexp.sweep.local import run_local, start_fork_server
+from uavexp.sweep.local import run_local
 
 LIMITS = Allowance(timeout_s=2.0, memory_mb=1000.0)
 

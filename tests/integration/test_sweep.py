@@ -25,9 +25,10 @@ from uavexp.store.history import commit
 from uavexp.store.records import Status, canonical_json, digest, read_record, seal
 from uavexp.store.study import collect, read_runs, read_study
 from uavexp.sweep.agenda import agenda_of
+from uavexp.sweep.fork_server import start_fork_server
 from uavexp.sweep.head_start import PRELOAD
 from uavexp.sweep.job import Allowance
-from uavexp.sweep.local import run_local, start_fork_server
+from uavexp.sweep.local import run_local
 from uavexp.sweep.trial_job import fly_job
 
 STUDY = (*QUICK, "strategy=mcr,tbr", "seed=0:3")

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from uavexp.errors import ConfigError
+from uavexp.paths import expanded
 
 PRESET_GROUP = "strategy"  # only overrides other groups; has no component
 EXPERIMENT_GROUP = "experiments"  # files of their own, see `uavexp.config.experiment`
@@ -35,7 +36,7 @@ class Option:
 
 def user_folder(path: str) -> Path:
     """Absolute folder given by `--config-dir`, checked to exist."""
-    folder = Path(path).expanduser().resolve()
+    folder = expanded(path).resolve()
     if not folder.is_dir():
         raise ConfigError(f"--config-dir {path}: no such folder")
     return folder

@@ -9,6 +9,7 @@ from typing import Any
 from uavexp.config.trust import VARIABLE, is_trusted
 from uavexp.errors import ConfigError
 from uavexp.metrics.metric import Measure, Metric, Metrics
+from uavexp.parameters import check_value
 
 
 def modules_of(value: Any) -> tuple[str, ...]:
@@ -17,7 +18,8 @@ def modules_of(value: Any) -> tuple[str, ...]:
     Raises:
         ConfigError: as `own_metrics` does.
     """
-    modules = () if value is None else (value,) if isinstance(value, str) else tuple(map(str, value))
+    named = [] if value is None else value if isinstance(value, list) else [value]
+    modules = tuple(check_value("metrics", name, str) for name in named)
     own_metrics(modules)
     return modules
 

@@ -19,7 +19,7 @@ from uavexp.parameters import Count, Positive, between
 class FieldParameters:
     """Parameters that every backend has; no state."""
 
-    voxel_size_m: Positive = 0.10  # m; the paper's
+    voxel_size_m: Annotated[float, between(0.005, 0.5)] = 0.10  # m; the paper's
     esdf_rate_hz: Positive = 10.0  # Hz; the paper's
     max_distance_m: Positive = 2.0  # m, truncation of the field; >= trigger.monitor_radius_m [ours]
     max_memory_mb: Positive = 1000.0  # 10^6 bytes; larger maps are refused [ours]

@@ -15,7 +15,7 @@ from typing import IO
 
 from uavexp.config.composition import CommandLine
 from uavexp.errors import ConfigError, RecordError
-from uavexp.paths import outputs_root
+from uavexp.paths import expanded, outputs_root
 from uavexp.store.files import own_folder
 from uavexp.store.records import write_bytes
 from uavexp.store.study import ASIDE, STUDY, TRIALS, WORLDS
@@ -32,7 +32,7 @@ def folder_of(command: CommandLine) -> Path:
         ConfigError: it holds something else than a study.
     """
     if command.out is not None:
-        folder = Path(command.out).expanduser().absolute()
+        folder = expanded(command.out).absolute()
     elif command.experiment is not None:
         folder = outputs_root() / command.experiment.name
     else:

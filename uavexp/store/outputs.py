@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from uavexp.config.composition import Cell
 from uavexp.errors import ConfigError, WorldError
 from uavexp.flight import Trial
 from uavexp.log import Replan
+from uavexp.paths import expanded
 from uavexp.store.logs import arrays_digest, log_arrays, pack
 from uavexp.store.records import LOG, RECORD, WALL, Status, canonical_json, seal
 from uavexp.types import Outcome
@@ -135,7 +135,7 @@ def _content(group: str, key: str, value: Any) -> Any:
         return value
     try:
         digest = hashlib.sha256()
-        for file in formats.files(Path(value).expanduser()):
+        for file in formats.files(expanded(value)):
             digest.update(file.read_bytes())
     except (OSError, WorldError) as error:
         reason = getattr(error, "strerror", None) or str(error)

@@ -23,8 +23,9 @@ from typing import Any
 from uavexp.errors import ConfigError, UavexpError, one_line
 from uavexp.store.records import Status
 from uavexp.sweep.faults import failure
+from uavexp.sweep.fork_server import start_fork_server
 from uavexp.sweep.job import Allowance, Answer, Call, Done, Job
-from uavexp.sweep.local import run_local, start_fork_server
+from uavexp.sweep.local import run_local
 
 _ALLOWED_FAILURES = 1  # workers that one job may take down beyond the first
 _WORKER_MB = 2000  # of a worker itself and its fork server

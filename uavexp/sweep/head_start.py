@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from uavexp.config.options import RUNNER_GROUP
 from uavexp.config.overrides import Setting
 from uavexp.kernel_cache import has_kernels
-from uavexp.sweep.local import start_fork_server
+from uavexp.sweep.fork_server import start_fork_server
 
 PRELOAD = "uavexp.sweep.preload"
 

@@ -18,84 +18,24 @@ import tempfile
 import threading
 import time
 import warnings
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from multiprocessing import forkserver, resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import ForkServerProcess
 from multiprocessing.reduction import send_handle
 from typing import IO, Any
 
-from uavexp.errors import UavexpError
 from uavexp.store.records import Status
 from uavexp.sweep.child import REFUSED, run_child
 from uavexp.sweep.faults import death
+from uavexp.sweep.fork_server import RefusedError, ensure_fork_server, kill_fork_server, refusals_told
 from uavexp.sweep.job import Allowance, Answer, Call, Done, Job
 
 Watch = Callable[[Job, float, str], None]  # job, simulated time s, a few words
 
 _PARTING_S = 5.0  # a child that has answered may take so long to end
 _DUMP_BYTES = 20_000
-_TETHER = "uavexp.sweep.tether"
-
-
-def start_fork_server(preload: Sequence[str] = ()) -> None:
-    """Start the fork server, if none runs; call it from the main thread, with whose end it dies.
-
-    Args:
-        preload: modules that it imports once, for all children.
-    """
-    multiprocessing.get_context("forkserver").set_forkserver_preload([_TETHER, *preload])
-    _ensure_fork_server()
-
-
-def _ensure_fork_server() -> None:
-    """Start the fork server, if none runs, with what it is to import known."""
-    with _refusals_told():
-        resource_tracker.ensure_running()  # else the server starts it, which unblocks the signal
-        # the server inherits the mask: Ctrl-C is the supervisor's to handle, right after this
-        ours = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-        try:
-            forkserver.ensure_running()
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, ours)
-
-
-def _kill_fork_server() -> None:
-    """Kill a fork server that does not answer; who waits for it hears its end, a new one is started."""
-    pid = forkserver._forkserver._forkserver_pid  # type: ignore[attr-defined]
-    if pid is not None:
-        with contextlib.suppress(ProcessLookupError, ChildProcessError):
-            os.kill(pid, signal.SIGKILL)
-            os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)  # dead, for multiprocessing to find
-
-
-class RefusedError(UavexpError):
-    """The system refuses a process, a thread or an open file."""
-
-    exit_code = 1  # no fault of what was typed
-
-
-@contextlib.contextmanager
-def _refusals_told(*others: type[Exception]) -> Iterator[None]:
-    """Say in one line what the system refuses.
-
-    Args:
-        others: errors that it comes out as, besides those of Python itself.
-
-    Raises:
-        RefusedError: it does; or the fork server, refused a process, has ended.
-    """
-    kinds: tuple[type[Exception], ...] = (OSError, EOFError, RuntimeError, *others)
-    try:
-        yield
-    except kinds as error:
-        words = getattr(error, "strerror", None) or error
-        raise RefusedError(
-            f"no process can be started for a trial ({words}); fly fewer at a time, runner.n_jobs=1, or "
-            "raise what the system allows (ulimit -n files, ulimit -u processes)"
-        ) from error
 
 
 def run_local(
@@ -121,7 +61,7 @@ def run_local(
 
     supervisor = _Supervisor(call=call, limits=limits, watch=watch)
     pool = Parallel(n_jobs=n_jobs, backend="threading", return_as="generator_unordered", batch_size=1)
-    with _refusals_told(AttributeError):  # as which a pool that lacks a thread ends
+    with refusals_told(AttributeError):  # as which a pool that lacks a thread ends
         results = pool(delayed(supervisor.run)(job) for job in jobs)
     try:
         # not `yield from`: when closed, the children must be killed before joblib waits for them
@@ -174,12 +114,12 @@ class _Supervisor:
             RefusedError: the system refuses a process.
         """
         begin_s = time.monotonic()
-        with _refusals_told():
+        with refusals_told():
             taken = self._starter.submit(self._take)
         try:
             child = taken.result(self.limits.timeout_s)
         except TimeoutError:
-            _kill_fork_server()
+            kill_fork_server()
             answer = self._hung
         else:
             begin_s = time.monotonic()
@@ -195,7 +135,7 @@ class _Supervisor:
         """Kill every child, wait until it is gone, and let no other start."""
         self._stopped = True
         if not self._lock.acquire(timeout=_PARTING_S):
-            _kill_fork_server()  # for which a start waits
+            kill_fork_server()  # for which a start waits
             self._lock.acquire()
         try:
             for child in self._living:
@@ -224,18 +164,18 @@ class _Supervisor:
         try:
             return self._start_once()
         except RefusedError:
-            _kill_fork_server()
+            kill_fork_server()
             return self._start_once()
 
     def _start_once(self) -> _Child:
         context = multiprocessing.get_context("forkserver")
-        with _refusals_told():
+        with refusals_told():
             printed = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115
             ours, theirs = context.Pipe()
             with theirs:
                 arguments = (theirs, self.call, self.limits.memory_mb)
                 process = context.Process(target=run_child, args=arguments, daemon=True)
-                _ensure_fork_server()
+                ensure_fork_server()
                 process.start()
         return _Child(process=process, connection=ours, printed=printed)
 
@@ -252,7 +192,7 @@ class _Supervisor:
         with child.connection, child.printed:
             exit_code = self._end(child, grace_s=0.0 if late else _PARTING_S)
             if answer is None and exit_code == REFUSED:
-                with _refusals_told():
+                with refusals_told():
                     raise OSError(errno.EAGAIN, os.strerror(errno.EAGAIN))
             return answer or (self._hung if late else death(exit_code, _tail(child.printed)))
 
@@ -261,7 +201,7 @@ class _Supervisor:
         """Kill a child at its deadline, whatever it and this thread wait for then: one in mid-answer, too."""
         timer = threading.Timer(self.limits.timeout_s, _kill, [child.process])
         timer.daemon = True
-        with _refusals_told():
+        with refusals_told():
             timer.start()
         try:
             yield
@@ -304,7 +244,7 @@ def _await_end(*children: _Child) -> None:
     end_s = time.monotonic() + _PARTING_S
     for child in children:
         if not wait([child.process.sentinel], timeout=max(0.0, end_s - time.monotonic())):
-            _kill_fork_server()
+            kill_fork_server()
             return
 
 

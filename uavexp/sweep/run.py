@@ -23,9 +23,10 @@ from uavexp.sweep.agenda import Agenda, agenda_of
 from uavexp.sweep.audience import Audience
 from uavexp.sweep.child import die_with_parent
 from uavexp.sweep.dask import run_dask
+from uavexp.sweep.fork_server import start_fork_server
 from uavexp.sweep.head_start import PRELOAD
 from uavexp.sweep.job import Done, Job
-from uavexp.sweep.local import Watch, run_local, start_fork_server
+from uavexp.sweep.local import Watch, run_local
 from uavexp.sweep.runner import Backend, Runner, read_runner
 from uavexp.sweep.trial_job import TrialJob, WorldCheck, do_job, do_job_elsewhere, files_of, version
 

@@ -10,7 +10,7 @@ from enum import StrEnum
 from typing import Annotated, Any
 
 from uavexp.errors import require
-from uavexp.parameters import Constraint, Positive, check_value, option, parameter_types
+from uavexp.parameters import Constraint, between, check_value, option, parameter_types
 from uavexp.sweep.job import Allowance
 
 _ADDRESS = re.compile(r"(tcp|tls)://([\w.-]+|\[[0-9a-fA-F:.]+\]):(?P<port>\d{1,5})", re.ASCII)
@@ -29,15 +29,20 @@ class Queue(StrEnum):
     SLURM = "slurm"
 
 
+Jobs = Annotated[int, Constraint("-1 or 1 to 10000", lambda jobs: jobs == -1 or 1 <= jobs <= 10_000)]
+
+
 @option(frozen=True)
 class Runner:
     """Every trial in a process of its own on this machine."""
 
     backend: Backend = Backend.LOCAL  # local | dask
-    n_jobs: Annotated[int, Constraint("-1 or >= 1", lambda jobs: jobs == -1 or jobs >= 1)] = -1  # trials at
-    # a time, with backend dask workers to start; -1: as many as there are cores
-    timeout_s: Positive = 900.0  # s of clock time after which a trial counts as hung and is ended
-    memory_mb: Positive = 4096.0  # MB that one trial may take on top of a fresh process
+    n_jobs: Jobs = -1  # trials at a time, with backend dask workers to start; -1: as many as
+    # there are cores
+    timeout_s: Annotated[float, between(1e-3, 1e6)] = 900.0  # s of clock time after which a trial
+    # counts as hung and is ended
+    memory_mb: Annotated[float, between(1, 1e7)] = 4096.0  # MB that one trial may take on top of
+    # a fresh process
     dry_run: bool = False  # list what would be flown and fly nothing
     accept_other_code: bool = False  # keep finished trials of another version of uavexp or its packages
     # among the new ones

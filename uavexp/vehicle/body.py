@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
-from uavexp.parameters import Positive
+from uavexp.parameters import between
 from uavexp.types import Limits
 
 
@@ -12,13 +13,15 @@ from uavexp.types import Limits
 class Body:
     """Parameters that every vehicle has; no state."""
 
-    mass_kg: Positive = 0.75  # kg; paper 4
-    length_m: Positive = 0.32  # m, body box along x; paper 1
-    width_m: Positive = 0.32  # m, body box along y; paper 1
-    height_m: Positive = 0.12  # m, body box along z; paper 1
-    max_speed_mps: Positive = 2.5  # m/s; paper 1
-    max_acceleration_mps2: Positive = 2.5  # m/s^2 [ours]
-    max_body_rate_radps: Positive = 2.0  # rad/s, of each axis; paper 1 (axes [ours])
+    mass_kg: Annotated[float, between(0.01, 100)] = 0.75  # kg; paper 4
+    length_m: Annotated[float, between(0.01, 5)] = 0.32  # m, body box along x; paper 1
+    width_m: Annotated[float, between(0.01, 5)] = 0.32  # m, body box along y; paper 1
+    height_m: Annotated[float, between(0.01, 5)] = 0.12  # m, body box along z; paper 1
+    max_speed_mps: Annotated[float, between(0.05, 50)] = 2.5  # m/s; paper 1
+    max_acceleration_mps2: Annotated[float, between(0.05, 100)] = 2.5  # m/s^2 [ours]
+    max_body_rate_radps: Annotated[float, between(0.05, 100)] = (
+        2.0  # rad/s, of each axis; paper 1 (axes [ours])
+    )
 
     @property
     def limits(self) -> Limits:

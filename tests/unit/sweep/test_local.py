@@ -17,8 +17,9 @@ from tests.jobs import act
 from uavexp.errors import ConfigError
 from uavexp.paths import PACKAGE
 from uavexp.store.records import Status
+from uavexp.sweep.fork_server import start_fork_server
 from uavexp.sweep.job import Allowance, Done, Job
-from uavexp.sweep.local import run_local, start_fork_server
+from uavexp.sweep.local import run_local
 
 LIMITS = Allowance(timeout_s=60.0, memory_mb=1000.0)
 

@@ -1,0 +1,89 @@
+"""Names, numbers and physics that nobody means are refused in one line, if need be at the first step."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.sweeps import QUICK, begin, records, variables
+from uavexp.__main__ import main
+from uavexp.config.composition import Composer
+from uavexp.config.overrides import parse_settings
+from uavexp.errors import UavexpError
+from uavexp.store.folder import folder_of
+from uavexp.sweep.runner import read_runner
+
+LONG = "a" * 300
+
+
+@pytest.mark.parametrize(
+    "typed",
+    [
+        f"strategy={LONG}", f"out={LONG}", "out='a\0b'", "out='~nobody_of_that_name/x'", "out='a\nb'",
+        "step_s=1e-300", "step_s=1e-7", "step_s=10", "mapping.voxel_size_m=5", "runner.timeout_s=1e-300",
+        "runner.timeout_s=1e300", "runner.n_jobs=1e9", "runner.memory_mb=1e-9", "vehicle.mass_kg=1e-300",
+        "vehicle.max_acceleration_mps2=1e-300", "metrics=7", "metrics=[[]]",
+    ],
+)  # fmt: skip
+def test_it_is_refused_before_anything_is_made(typed: str) -> None:
+    with pytest.raises(UavexpError) as caught:  # noqa: PT012
+        command = Composer().command(parse_settings([typed]))
+        read_runner(command.runner)
+        folder_of(command)
+    assert 0 < len(str(caught.value)) < 2000
+
+
+def test_a_preset_that_includes_itself_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "strategy").mkdir()
+    (tmp_path / "strategy" / "loop.yaml").write_text("# @package _global_\ndefaults: [/strategy: loop]\n")
+    with pytest.raises(UavexpError, match="holds itself"):
+        Composer(user_folder=tmp_path).command(parse_settings(["strategy=loop"]))
+
+
+@pytest.mark.parametrize(
+    ("typed", "words"),
+    [
+        (["controller.drag_kgpm=1000"], "numbers overflow"),
+        (["vehicle=quadrotor", "vehicle.inertia_x_kgm2=1e-300"], "numbers overflow"),
+        (["mission.time_base_s=1e12"], "can be: lower mission.time_base_s"),
+    ],
+)
+def test_physics_that_no_number_holds_is_bad_input(
+    typed: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A division by zero, a NaN that became an index, an array of 566 GB."""
+    keys = {word.split("=")[0] for word in typed}
+    others = [word for word in QUICK if word.split("=")[0] not in keys]
+    assert main([*others, *typed, f"out={tmp_path / 'out'}"]) == 2
+    error = capsys.readouterr().err
+    assert words in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_terminal_that_closes_leaves_the_tables(tmp_path: Path) -> None:
+    """SIGHUP ended the process at once, without any."""
+    out = tmp_path / "out"
+    process = begin(*QUICK, "seed=0:40", "world_seed=0", "runner.n_jobs=1", f"out={out}")
+    while not records(out):
+        assert process.poll() is None
+        time.sleep(0.02)
+    process.send_signal(signal.SIGHUP)
+    _, error = process.communicate(timeout=60)
+    assert (process.returncode, error) == (130, "interrupted\n")
+    assert (out / "trials.parquet").is_file()
+
+
+def test_what_a_killed_command_left_in_the_temporary_folder_goes_with_the_next(tmp_path: Path) -> None:
+    code = "from uavexp.sweep.fork_server import start_fork_server as f; f(); import os, signal; {}"
+    for last in ("os.kill(os.getpid(), signal.SIGKILL)", "pass"):
+        more = {"TMPDIR": str(tmp_path)}
+        subprocess.run([sys.executable, "-c", code.format(last)], env=variables(**more), timeout=60)
+        left = os.listdir(tmp_path)
+        assert len(left) == (1 if "kill" in last else 0)
