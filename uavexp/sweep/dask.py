@@ -216,13 +216,17 @@ def _cluster(distributed: Any, queue: str | None, n_jobs: int, limits: Allowance
     """A cluster for this sweep, to be closed with it."""
     _import("dask").config.set({"distributed.scheduler.allowed-failures": _ALLOWED_FAILURES})
     if queue is None:
-        return distributed.LocalCluster(
-            n_workers=n_jobs,
-            threads_per_worker=1,
-            dashboard_address=None,
-            memory_limit=0,  # each child has its own
-            silence_logs=logging.CRITICAL,  # the death of a worker is told as the end of its job
-        )
+        try:
+            return distributed.LocalCluster(
+                n_workers=n_jobs,
+                threads_per_worker=1,
+                dashboard_address=None,
+                memory_limit=0,  # each child has its own
+                silence_logs=logging.CRITICAL,  # the death of a worker is told as the end of its job
+            )
+        except Exception as error:  # a worker that dies as it starts comes out as anything
+            words = one_line(error)[:200] or type(error).__name__
+            raise LostError(f"no Dask workers could be started on this machine ({words})") from error
     cluster = slurm_cluster(limits)
     cluster.scale(n_jobs)
     return cluster
