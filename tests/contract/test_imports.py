@@ -19,7 +19,7 @@ LAYERS = (
     {"braking", "triangle_grid", "bodies", "scene", "formats"},
     {"cloud"},
     {"roles", "metrics", "inspection"},
-    {"recorder", "map_grid", "seen_share", "passage", "pilot", "motion", "trial"},
+    {"recorder", "map_grid", "seen_share", "passage", "pilot", "motion", "finite", "trial"},
     {"config"},
     {"flight", "__init__", "policy", "env"},
     {"store", "check"},
