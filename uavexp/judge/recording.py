@@ -12,6 +12,7 @@ from uavexp.errors import RecordError
 
 _LONG_GAPS = 10.0  # times the usual time between positions: told
 _LONGEST_S = 5.0  # usually between positions; beyond it they are no seconds, or no flight
+_FARTHEST_M = 1e6
 _MOST_ROWS = 2_000_000  # even steps from the first position to the last
 _NED_TO_ENU = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 _FRD_TO_FLU = np.diag([1.0, -1.0, -1.0])
@@ -59,6 +60,9 @@ def checked(recording: Recording) -> Recording:
     track = Track(time_s=track.time_s[there], values=track.values[there])
     if len(track.time_s) < 2:
         raise RecordError(f"{where} has {len(track.time_s)} positions, a flight needs at least 2")
+    farthest_m = float(np.abs(track.values).max())
+    if farthest_m > _FARTHEST_M:
+        raise RecordError(f"{where}: a position is {farthest_m:.3g} m from the origin; is it in metres?")
     step_s = np.diff(track.time_s)
     if (step_s <= 0.0).any():
         n = int((step_s <= 0.0).argmax()) + 1

@@ -188,6 +188,7 @@ def test_stamps_that_do_not_increase_are_refused(times, said, tmp_path, capsys):
         ("a.csv", "t,x,y,z\n0,1,1\n", "row 0 has 3 columns, 4 are needed"),
         ("a.csv", "t,x,y,z\n0,,,\n1,nan,1,1\n", "has 0 positions"),
         ("a.csv", "", "no rows"),
+        ("a.csv", "t,x,y,z\n0,0,0,0\n1,0,4e7,0\n", "a position is 4e+07 m from the origin"),
         ("a.tum", "0 1 2\n", "row 0 has 3 columns, 4 are needed"),
         ("a.ulg", "ULog", "damaged, or not a PX4 log"),
         ("a.bag", "#ROSBAG V2.0\n", "damaged, or not a ROS bag"),
