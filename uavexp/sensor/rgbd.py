@@ -40,6 +40,7 @@ class Rgbd:
     mount_pitch_deg: Annotated[float, between(-90, 90)] = 0.0  # deg, optical axis above (+) or below
     # (-) body x [ours]
     axial_noise: bool = True  # sigma(z) = 0.0012 + 0.0019 (z - 0.4)^2 m; Nguyen et al. 2012
+    axial_noise_scale: NonNegative = 1.0  # times that sigma [ours]
     quantisation: bool = True  # disparity rounded to steps; Khoshelham and Elberink 2012
     baseline_m: Positive = 0.075  # m, projector to infrared camera; Khoshelham and Elberink 2012
     disparity_focal_px: Positive = 580.0  # px, focal length of the infrared camera;
@@ -109,7 +110,7 @@ class Rgbd:
         return DepthNoise(
             min_range_m=np.float32(self.min_range_m),
             max_range_m=np.float32(self.max_range_m),
-            axial=np.float32(self.axial_noise),
+            axial=np.float32(self.axial_noise_scale if self.axial_noise else 0.0),
             disparity_unit_m=np.float32(unit_m if self.quantisation else 0.0),
             edge_ratio=np.float32(self.edge_ratio),
             edge_probability=np.float32(self.edge_missing_probability if self.edge_missing else 0.0),
