@@ -101,6 +101,14 @@ def judge(
     return (evidence << _EVIDENCE) | (byte & _LISTED) | state if judged >= -rule.solid_depth_m else byte
 
 
+@nb.njit(cache=True, inline="always")
+def hit_again(byte: int, rule: FusionRule) -> int:
+    """Return a voxel's byte after a hit that outweighs the miss its centre may be in the same scan."""
+    evidence = min((byte >> _EVIDENCE) + rule.hit_evidence + rule.miss_evidence, rule.max_evidence)
+    state = OCCUPIED if evidence >= rule.occupied_evidence else byte & _STATE
+    return (evidence << _EVIDENCE) | (byte & _LISTED) | state
+
+
 @nb.njit(cache=True, error_model="numpy", inline="always")
 def fuse(
     observed_m: np.float32, before_m: np.float32, weight: int, byte: int, rule: FusionRule
