@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from uavexp.arrays import Float
 from uavexp.geometry import polyline_length_m
 from uavexp.log import TrialLog
-from uavexp.metrics.metric import Metric, Metrics
+from uavexp.metrics.ending import success
+from uavexp.metrics.metric import Flight, Metric, Metrics
 
 
 def path_length_m(log: TrialLog) -> float:
@@ -36,6 +39,20 @@ def detour(length_m: float, shortest_m: float) -> float:
     return length_m / shortest_m if shortest_m > 0.0 else float("nan")
 
 
+def success_by_path_length(flight: Flight) -> float | None:
+    """Success x shortest / flown length, SPL, in [0, 1]; a contact is a failure (Anderson et al. 2018).
+
+    None for a mission without a target, NaN where no shortest path is known.
+    """
+    log, shortest_m = flight.log, float(flight.world.difficulty.shortest_path_m)
+    if math.isfinite(log.seen_share) or log.inspection.cell_m.size:
+        return None
+    if not success(log):
+        return 0.0
+    longer_m = max(path_length_m(log), shortest_m)
+    return shortest_m / longer_m if longer_m > 0.0 else float("nan")
+
+
 METRICS: Metrics = {
     Metric(
         column="path_length_m", title="Path length, APL", unit="m", digits=1, better=-1, needs_arrival=True
@@ -50,6 +67,13 @@ METRICS: Metrics = {
         needs_arrival=True,
         missing="no shortest path is known",
     ): lambda flight: detour(path_length_m(flight.log), float(flight.world.difficulty.shortest_path_m)),
+    Metric(
+        column="spl",
+        title="Success by path length, SPL",
+        digits=3,
+        better=1,
+        missing="no shortest path is known",
+    ): success_by_path_length,
     Metric(
         column="completion_time_s",
         title="Completion time, CT",

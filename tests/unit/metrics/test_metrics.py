@@ -67,6 +67,30 @@ class TestPath:
         assert values["mean_speed_mps"] == pytest.approx(0.5, rel=1e-12)
 
 
+class TestSuccessByPathLength:
+    """SPL of a flight of 10 m where 8 m would do: 0.8, and 0 after a contact or when it did not arrive."""
+
+    @staticmethod
+    def spl(shortest_m, **fields):
+        flown = {"outcome": Outcome.REACHED, **fields}
+        return evaluate(make_log(line, line_velocity, **flown), make_world([], shortest_m=shortest_m)).get("spl")
+
+    def test_is_the_shortest_over_the_flown_length(self):
+        assert self.spl(8.0) == pytest.approx(0.8, rel=1e-12)
+
+    def test_is_one_at_most(self):
+        assert self.spl(12.0) == 1.0
+
+    def test_is_nothing_without_success(self):
+        assert self.spl(8.0, outcome=Outcome.TIMEOUT) == 0.0
+        contact = Contact(start_s=1.0, end_s=1.1, position_m=np.zeros(3))
+        assert self.spl(8.0, contacts=(contact,)) == 0.0
+
+    def test_needs_a_shortest_path_and_a_target(self):
+        assert math.isnan(self.spl(math.nan))
+        assert self.spl(8.0, outcome=Outcome.EXPLORED, seen_share=0.9) is None
+
+
 class TestSmoothness:
     def test_helix_has_the_centripetal_acceleration_and_its_jerk(self):
         values = evaluate(make_log(helix, helix_velocity), WORLD)
