@@ -5,22 +5,44 @@ All of it is kept from one choice to the next and brought up to date where the m
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from uavexp.arrays import Bool, Float, Int, Int32, UInt8
 from uavexp.explorer.planar import mark_frontier
-from uavexp.explorer.waves import DIAGONAL, FAR, STRAIGHT, Wave, begin, forget, mark_kinds, new_wave, reach
+from uavexp.explorer.waves import (
+    DIAGONAL,
+    FAR,
+    STRAIGHT,
+    WALL_LEVELS,
+    Wave,
+    begin,
+    forget,
+    mark_kinds,
+    new_wave,
+    reach,
+    way_back,
+)
 from uavexp.field import FREE, DistanceField
 from uavexp.mapping.projection import Band, Part, PlanarMap, Projection
 
 Cell = tuple[int, int]
 
 
-def prices(unknown: float, occupied: float) -> Int32:
-    """What cells of each kind cost; a free one is the unit, 0: no way leads over them."""
-    return np.array([0, round(STRAIGHT * unknown), STRAIGHT, round(STRAIGHT * occupied)], dtype=np.int32)
+def prices(unknown: float, occupied: float, at_wall: float | None = None) -> Int32:
+    """What cells of each kind cost; a free one is the unit, 0: no way leads over them.
+
+    Args:
+        unknown: far from any wall that was seen.
+        occupied: nearer to an obstacle than a free cell.
+        at_wall: unknown at such a wall, less farther from it; None: as elsewhere.
+    """
+    share = (np.arange(WALL_LEVELS) + 0.5) / WALL_LEVELS
+    near = unknown + (1.0 - share) * ((unknown if at_wall is None else at_wall) - unknown)
+    price: Int32 = np.rint(STRAIGHT * np.array([0.0, unknown, 1.0, occupied, *near])).astype(np.int32)
+    return price
 
 
 KNOWN = prices(unknown=0.0, occupied=0.0)
@@ -79,7 +101,10 @@ class Passage:
         float  # ... but for so far around the vehicle: too near to an obstacle, it must find its way out
     )
     target: Cell | None
+    wall_m: float = 0.0  # unknown cells so near to an obstacle have prices of their own
+    target_price: Int32 = field(default_factory=_OPTIMISTIC.copy)  # of each kind on ways to the target
     vehicle: Cell = (0, 0)
+    closed: Bool = field(init=False)  # (X, Y) cells that no way may lead over, whatever is known of them
     _parts: list[Int] = field(default_factory=list)  # of the plane that changed and were not looked at yet
     _kind: UInt8 = field(init=False)  # ((X + 2) (Y + 2),) not passable, unknown, free, occupied
     _price: Int32 = field(init=False)  # of each kind on ways from the vehicle
@@ -90,6 +115,7 @@ class Passage:
         rows, columns = self.plane.map.state.shape
         size = (rows + 2) * (columns + 2)
         self._kind = np.zeros(size, dtype=np.uint8)
+        self.closed = np.zeros((rows, columns), dtype=np.bool_)
         self._from_vehicle, self._from_target = new_wave(size), new_wave(size)
         self._parts = [np.array([[0, rows, 0, columns]])]
         if self.target is not None:
@@ -108,12 +134,12 @@ class Passage:
         self.vehicle = vehicle
         level = mark_kinds(
             self.plane.map.state, self.plane.map.clearance, np.concatenate([*self._parts, np.array(around)]),
-            self.plane.inside, np.float32(self.clearance_m), vehicle, reach_cells**2, self._kind,
-            self._from_target,
+            self.plane.inside, np.float32(self.clearance_m), np.float32(self.wall_m), self.closed, vehicle,
+            reach_cells**2, self._kind, self.target_price, self._from_target,
         )  # fmt: skip
         self._parts.clear()
         if level < FAR - 1:
-            forget(self._from_target, level)
+            forget(self._from_target, level, math.ceil(math.sqrt(2.0) * int(self.target_price.max())))
 
     def begin(self, price: Int32) -> None:
         """Ask for ways from the vehicle over cells of these prices."""
@@ -126,8 +152,28 @@ class Passage:
         return self._cost(self._from_vehicle, self._price, cell, most)
 
     def from_target(self, cell: Cell, most: float = np.inf) -> float:
-        """The same from the target, unknown counted as free; 0 without a target."""
-        return 0.0 if self.target is None else self._cost(self._from_target, _OPTIMISTIC, cell, most)
+        """The same from the target, over cells of the prices to it; 0 without a target."""
+        return 0.0 if self.target is None else self._cost(self._from_target, self.target_price, cell, most)
+
+    def way_to_target(self, cell: Cell) -> Int:
+        """Cells (N, 2) of the least way from one to the target, both included; none when there is no way."""
+        start = self._flat(cell)
+        if self.from_target(cell) == np.inf:
+            return np.zeros((0, 2), dtype=np.int64)
+        flat = way_back(self._from_target, self._kind, self._width, self.target_price, start)
+        return np.column_stack(np.divmod(flat.astype(np.int64), self._width)) - 1
+
+    def close(self, cells: list[Cell], radius_cells: float) -> None:
+        """Close all cells so near to these, and no others."""
+        i, j = np.ogrid[: self.closed.shape[0], : self.closed.shape[1]]
+        closed = np.zeros_like(self.closed)
+        for cell in cells:
+            closed |= (i - cell[0]) ** 2 + (j - cell[1]) ** 2 <= radius_cells**2
+        changed = np.argwhere(closed != self.closed)
+        if len(changed):
+            low, high = changed.min(axis=0), changed.max(axis=0) + 1
+            self._parts.append(np.array([[low[0], high[0], low[1], high[1]]]))
+        self.closed = closed
 
     def knows_a_way(self, cell: Cell) -> bool:
         """Whether cells known to be free lead from the vehicle to this one."""

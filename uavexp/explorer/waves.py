@@ -17,11 +17,13 @@ from typing import NamedTuple
 import numba as nb
 import numpy as np
 
-from uavexp.arrays import Float32, Int, Int32, UInt8
+from uavexp.arrays import Bool, Float32, Int, Int32, UInt8
+from uavexp.field import UNKNOWN
 from uavexp.mapping.projection import Part
 
 FAR = 2**31 - 1
 STRAIGHT, DIAGONAL = 100, 141  # steps between cells of the least cost
+NEAR_WALL, WALL_LEVELS = 4, 8  # kinds of unknown cells by their distance from a wall
 _SLANT = 0.7071067811865476
 _BUCKETS = 1024  # > the longest step, sqrt(2) times the greatest cost
 _RING = _BUCKETS - 1
@@ -123,36 +125,38 @@ def reach(wave: Wave, kind: UInt8, width: int, price: Int32, goal: int, most: in
 
 
 @nb.njit(cache=True)
-def forget(wave: Wave, level: int) -> None:
-    """Take back every cost above the level; every passable cell has the least price.
+def forget(wave: Wave, level: int, longest: int) -> None:
+    """Take back every cost above the level.
 
-    What costs at most `level` must hold as it is, and cells from which a step leads beyond are
-    left anew.
+    What costs at most `level` must hold as it is, and cells from which a step, of cost `longest` at
+    most, leads beyond are left anew.
     """
     cost, order, clock = wave.cost, wave.order, wave.clock
-    if clock[4] == 0:  # the source is still waiting, and has reached nothing
-        return
-    level = max(min(level, clock[0] - 1), 0)
+    level, waiting = max(min(level, clock[0] - 1), 0), -1
     for cell in wave.cell[: clock[2]]:  # all that were reached since the last time
+        if cost[cell] == 0:
+            waiting = cell  # the source, if it has not been left since then
         if cost[cell] > level:
             cost[cell] = FAR
     wave.head[:] = -1
-    clock[0], clock[1], clock[2] = max(level - DIAGONAL + 1, 0), 0, 0
-    while clock[4] > 0 and cost[order[clock[4] - 1]] > level - DIAGONAL:
+    clock[0], clock[1], clock[2] = max(level - longest + 1, 0), 0, 0
+    while clock[4] > 0 and cost[order[clock[4] - 1]] > level - longest:
         clock[4] -= 1
         cell = order[clock[4]]
         if cost[cell] <= level:
             _enter(wave, cell, cost[cell])
         else:
             cost[cell] = FAR
+    if clock[2] == 0 and clock[4] == 0 and waiting >= 0:
+        _enter(wave, waiting, 0)
 
 
 @nb.njit(cache=True)
 def mark_kinds(
-    state: UInt8, clearance: Float32, parts: Int, inside: Part, clearance_m: np.float32,
-    vehicle: tuple[int, int], escape2: float, kind: UInt8, target: Wave,
+    state: UInt8, clearance: Float32, parts: Int, inside: Part, clearance_m: np.float32, wall_m: np.float32,
+    closed: Bool, vehicle: tuple[int, int], escape2: float, kind: UInt8, price: Int32, target: Wave,
 ) -> int:  # fmt: skip
-    """Mark what parts of the plane are to a wave: 0 not passable, else 1 + their state.
+    """Mark what parts of the plane are to a wave: 0 not passable, else 1 + their state, or `NEAR_WALL` on.
 
     Args:
         state: (X, Y) of the planar map.
@@ -160,14 +164,17 @@ def mark_kinds(
         parts: (P, 4) rows from, to, columns from, to.
         inside: the part within the flight bounds.
         clearance_m: that passable cells exceed.
+        wall_m: unknown cells of less clearance are told apart, in `WALL_LEVELS` from the wall on; 0: none.
+        closed: (X, Y) cells that are not passable whatever is known of them.
         vehicle: cell.
         escape2: squared cells around it in which any clearance will do.
         kind: ((X + 2) * (Y + 2),) is written.
-        target: wave from the target, every passable cell at the least price.
+        price: of each kind in the wave from the target.
+        target: that wave.
 
     Returns:
-        The cost from the target up to which nothing has changed: below that of a cell that is no
-        longer passable, and at most a step above the neighbours of a cell that is so now.
+        The cost from the target up to which nothing has changed: below that of a cell whose price
+        is another now, and at most that of its neighbours.
     """
     width, level = state.shape[1] + 2, np.int64(FAR)
     i0, i1, j0, j1 = inside
@@ -177,12 +184,46 @@ def mark_kinds(
                 at = (i + 1) * width + j + 1
                 room = clearance[i, j]
                 near = (i - vehicle[0]) ** 2 + (j - vehicle[1]) ** 2 <= escape2
-                now = 1 + state[i, j] if room > clearance_m or (room > 0.0 and near) else 0
-                if now == 0 and kind[at] > 0:
+                fits = room > clearance_m or (room > 0.0 and near)
+                now = 1 + state[i, j] if fits and not closed[i, j] else 0
+                if now == 1 + UNKNOWN and room < wall_m:
+                    now = NEAR_WALL + int(WALL_LEVELS * max(room, np.float32(0.0)) / wall_m)
+                before = kind[at]
+                if price[now] != price[before]:
                     level = min(level, target.cost[at] - 1)
-                elif now > 0 and kind[at] == 0:
                     for a in range(-1, 2):
                         for b in range(-1, 2):
-                            level = min(level, target.cost[at + a * width + b] + STRAIGHT)
+                            level = min(level, target.cost[at + a * width + b])
                 kind[at] = now
     return int(level)
+
+
+@nb.njit(cache=True)
+def way_back(wave: Wave, kind: UInt8, width: int, price: Int32, start: int) -> Int32:
+    """Cells (N,) of the least way from a cell that the wave has reached to its source, both included."""
+    cost = wave.cost
+    cells = np.empty(cost.shape[0], np.int32)
+    at, count = start, 0
+    while True:
+        cells[count] = at
+        count += 1
+        if cost[at] == 0:
+            return cells[:count].copy()
+        here, best, least = price[kind[at]], at, np.int64(FAR)
+        for a in range(-1, 2):
+            for b in range(-1, 2):
+                near = at + a * width + b
+                if cost[near] >= cost[at]:
+                    continue
+                there = wave.clock[3] if cost[near] == 0 and price[kind[near]] == 0 else price[kind[near]]
+                if a != 0 and b != 0:
+                    if price[kind[at + a * width]] == 0 or price[kind[at + b]] == 0:
+                        continue
+                    step = int((here + there) * _SLANT)
+                else:
+                    step = (here + there) // 2
+                if cost[near] + step < least:
+                    best, least = near, np.int64(cost[near] + step)
+        if best == at:
+            return cells[:0].copy()
+        at = best

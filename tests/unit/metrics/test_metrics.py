@@ -73,7 +73,9 @@ class TestSuccessByPathLength:
     @staticmethod
     def spl(shortest_m, **fields):
         flown = {"outcome": Outcome.REACHED, **fields}
-        return evaluate(make_log(line, line_velocity, **flown), make_world([], shortest_m=shortest_m)).get("spl")
+        return evaluate(make_log(line, line_velocity, **flown), make_world([], shortest_m=shortest_m)).get(
+            "spl"
+        )
 
     def test_is_the_shortest_over_the_flown_length(self):
         assert self.spl(8.0) == pytest.approx(0.8, rel=1e-12)
