@@ -25,6 +25,7 @@ from uavexp.field import UNKNOWN
 from uavexp.parameters import NonNegative, Positive, Unknown, between, option
 from uavexp.types import Goal, Limits, Observation
 
+_OPEN = "over all that is not known to be closed"  # the passage of ways to the target
 _ROUNDING = 0.05  # of costs of ways, cells
 _TRIES = 4  # places where ways enter the unknown that one choice may set aside
 
@@ -37,7 +38,7 @@ class ExpectedPath(Frontier):
     unknown_cost: Annotated[float, between(1, 5)] = (
         1.0  # an unknown cell counts as so many free ones ... [ours]
     )
-    wall_cost: Annotated[float, between(1, 5)] = 2.5  # ... and as so many at a wall that was seen ... [ours]
+    wall_cost: Annotated[float, between(1, 5)] = 3.0  # ... and as so many at a wall that was seen ... [ours]
     wall_m: Positive = 0.8  # m, ... less with the distance from it, up to here [ours]
     narrow_cost: Annotated[float, between(1, 5)] = 4.0  # a known cell with less than min_clearance_m counts
     # as so many free ones [ours]
@@ -45,12 +46,11 @@ class ExpectedPath(Frontier):
     # [ours]
     hysteresis: NonNegative = 1.0  # m, by which another way must be cheaper before the goal is reached [ours]
     _entry: Cell | None = field(init=False, repr=False, default=None)  # where the way enters the unknown
-    _way: Passage | None = field(init=False, repr=False, default=None)
 
     def reset(self, flight_height_m: float, limits: Limits) -> None:
         """Begin a trial at this flight height."""
         Frontier.reset(self, flight_height_m, limits)
-        self._entry = self._way = None
+        self._entry = None
 
     def reject(self, position_m: Float, time_s: float) -> None:
         """Set this goal aside for `set_aside_s`, and the place where its way enters the unknown."""
@@ -92,9 +92,9 @@ class ExpectedPath(Frontier):
     def _open_ways(self, observation: Observation, target_m: Float) -> Passage:
         """Ways to the target over all that is not known to be closed, up to date."""
         plane = self._look(observation)
-        target, passage = plane.map.cell_of(target_m), self._way
-        if passage is None or passage.plane is not plane or passage.target != target:
-            passage = self._way = Passage(
+        target, passage = plane.map.cell_of(target_m), self._passages.get(_OPEN)
+        if passage is None or passage.target != target:
+            passage = self._passages[_OPEN] = Passage(
                 plane=plane,
                 clearance_m=min(self.narrow_clearance_m or self.min_clearance_m, self.min_clearance_m),
                 escape_m=self.escape_m,

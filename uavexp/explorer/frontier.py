@@ -100,7 +100,8 @@ class Frontier:
     _current: Goal | None = field(init=False, repr=False, default=None)
     _aside: list[tuple[float, Float]] = field(init=False, repr=False, default_factory=list)
     _plane: Plane | None = field(init=False, repr=False, default=None)
-    _passages: dict[float, Passage] = field(init=False, repr=False, default_factory=dict)  # by clearance
+    _passages: dict[float | str, Passage] = field(init=False, repr=False, default_factory=dict)
+    # by clearance, or by what they are for
 
     def __post_init__(self) -> None:
         require(

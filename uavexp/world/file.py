@@ -38,7 +38,8 @@ class File:
 
     path: Annotated[str, Constraint("the name of a world file", bool)]  # mesh ply obj stl glb gltf dae,
     # Gazebo's world sdf; cloud pcd ply xyz pts npz las laz; voxels npz bt ot 3dmap; plan yaml (ROS) dxf wkt;
-    # relative to the working directory
+    # relative to the folder
+    folder: str = ""  # where the file lies; empty: the working directory
     unit_m: Positive | None = None  # m, length of one unit of the file (0.001 for mm, 0.0254 for inches);
     # null: as it says, or 1 m
     up_axis: Literal["x", "y", "z", "-x", "-y", "-z"] | None = None  # the file's axis that points up:
@@ -71,12 +72,17 @@ class File:
     def survey(self) -> Survey:
         """Return the building; raise `WorldError` in one line when the file is unusable."""
         options = formats.Options(wall_height_m=self.wall_height_m, unit_m=self.unit_m, layers=self.layers)
-        content = formats.read(Path(self.path), options)
+        if self.folder and not Path(self.folder).is_dir():
+            raise WorldError(
+                f"world.folder={self.folder} does not exist; type world.folder=FOLDER, the one in which "
+                f"{self.path} lies"
+            )
+        content = formats.read(Path(self.folder) / self.path, options)
         building = building_of(content, self._reading(content))
         bounds_m = self._checked_bounds(building)
         scene = Scene.from_mesh(building.vertices_m, building.triangles)
         return Survey(
-            path=self.path,
+            path=str(Path(self.folder) / self.path),
             content=content,
             building=building,
             flight_bounds_m=bounds_m,
@@ -90,7 +96,7 @@ class File:
         if self.flight_bounds_m is not None:
             bounds_m = np.array(self.flight_bounds_m) + np.array([[-MAP_MARGIN_M], [MAP_MARGIN_M]])
         return Reading(
-            frame=frame_of(content, self.path, self.unit_m, self.up_axis),
+            frame=frame_of(content, str(Path(self.folder) / self.path), self.unit_m, self.up_axis),
             voxel_size_m=self.voxel_size_m,
             wall_height_m=self.wall_height_m,
             unmeasured_is_solid=self.unknown == "wall",

@@ -136,3 +136,25 @@ def test_a_frontier_that_stays_unknown_from_near_is_set_aside() -> None:
     here = replace(seen, state=hovering((3.7, 2.4, HEIGHT_M)))
     goal = chosen(explorer, here)
     assert np.linalg.norm(goal.position_m - here.state.position_m) > explorer.commit_m
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_is_kept_between_choices_follows_the_map(seed: int) -> None:
+    """Walls come into sight, the unknown recedes: the goal is the one that a new explorer chooses."""
+    whole = random_map(np.random.default_rng(seed), 9.0)
+    state, distance = whole.state.copy(), whole.distance.copy()
+    changed = np.zeros((12, 8), dtype=np.int32)
+    field = replace(whole, state=state, distance=distance, changed=changed)
+    state[24:] = UNKNOWN
+    kept = begun(set_aside_s=0.0)
+    for depth in range(24, 80, 8):
+        state[:depth] = whole.state[:depth]
+        changed[: depth // 8] += 1
+        for x_m in (1.0, 1.3):
+            seen = replace(hall(9.0), field=field, state=hovering((x_m, 2.4, HEIGHT_M)))
+            kept._current = None
+            goal, anew = kept.select(seen), begun(set_aside_s=0.0).select(seen)
+            assert (goal is None) == (anew is None)
+            if goal is not None and anew is not None:
+                np.testing.assert_array_equal(goal.position_m, anew.position_m)
+                assert goal.score == anew.score

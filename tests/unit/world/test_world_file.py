@@ -375,3 +375,12 @@ def test_bad_parameters_are_refused_before_the_file_is_opened(
 def test_unit_and_axis_do_not_apply_to_ros_maps() -> None:
     with pytest.raises(UavexpError, match="apply to a plan"):
         read(DATA / "flat_map.yaml", unit_m=0.01)
+
+
+def test_a_file_is_looked_for_in_the_folder_and_a_missing_folder_is_told() -> None:
+    start_to_target = read("flat.ply", folder=str(DATA)).shortest_path
+    np.testing.assert_array_equal(start_to_target, read(DATA / "flat.ply").shortest_path)
+    with pytest.raises(
+        WorldError, match=r"^world\.folder=/no/where does not exist; type world\.folder=FOLDER"
+    ):
+        read("flat.ply", folder="/no/where")
