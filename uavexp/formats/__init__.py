@@ -14,6 +14,7 @@ from types import ModuleType
 import numpy as np
 
 from uavexp.errors import WorldError
+from uavexp.paths import expanded
 from uavexp.formats.base import FREE, SOLID, UNMEASURED, Cells, Content, Options
 
 __all__ = ["FREE", "READERS", "SOLID", "UNMEASURED", "Cells", "Content", "Options", "files", "read"]
@@ -57,6 +58,13 @@ def read(path: Path, options: Options) -> Content:
     except MemoryError as error:
         raise WorldError(f"world file {path} holds more than the memory does; give a part of it") from error
     return content
+
+
+def located(folder: str, path: str) -> Path:
+    """Where a world's file lies; `folder` may be empty. Raises `WorldError` when it does not exist."""
+    if folder and not expanded(folder).is_dir():
+        raise WorldError(f"folder={folder} does not exist; type world.folder=FOLDER, where {path} lies")
+    return expanded(folder) / expanded(path)
 
 
 def files(path: Path) -> tuple[Path, ...]:

@@ -14,7 +14,6 @@ from uavexp.config.composition import Cell
 from uavexp.errors import ConfigError, WorldError
 from uavexp.flight import Trial
 from uavexp.log import Replan
-from uavexp.paths import expanded
 from uavexp.store.logs import arrays_digest, log_arrays, pack
 from uavexp.store.records import LOG, RECORD, WALL, Status, canonical_json, seal
 from uavexp.types import Outcome
@@ -37,10 +36,7 @@ _REPLAN = (
 
 def identity(cell: Cell) -> dict[str, Any]:
     """What makes a cell this cell: its configuration, files by their contents."""
-    config = {
-        group: {key: _content(group, key, value) for key, value in cell.config[group].items()}
-        for group in GROUPS
-    }
+    config = {group: _by_contents(group, cell.config[group]) for group in GROUPS}
     numbers = {key: cell.config[key] for key in top_level()}
     return {"strategy": cell.strategy, "options": cell.options, "config": {**config, **numbers}}
 
@@ -129,13 +125,21 @@ def _json(value: Any) -> bytes:
     return (canonical_json(value) + "\n").encode()
 
 
-def _content(group: str, key: str, value: Any) -> Any:
-    """A file parameter by its contents, so that a record holds no path."""
+def _by_contents(group: str, parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Parameters with files by their contents, so that a record holds no path."""
+    folder = str(parameters.get("folder", ""))
+    return {
+        key: "" if key == "folder" else _content(group, key, value, folder)
+        for key, value in parameters.items()
+    }
+
+
+def _content(group: str, key: str, value: Any, folder: str) -> Any:
     if key == TARGET or not isinstance(value, str) or not (key == "path" or key.endswith("_path")):
         return value
     try:
         digest = hashlib.sha256()
-        for file in formats.files(expanded(value)):
+        for file in formats.files(formats.located(folder, value)):
             digest.update(file.read_bytes())
     except (OSError, WorldError) as error:
         reason = getattr(error, "strerror", None) or str(error)

@@ -72,17 +72,12 @@ class File:
     def survey(self) -> Survey:
         """Return the building; raise `WorldError` in one line when the file is unusable."""
         options = formats.Options(wall_height_m=self.wall_height_m, unit_m=self.unit_m, layers=self.layers)
-        if self.folder and not Path(self.folder).is_dir():
-            raise WorldError(
-                f"world.folder={self.folder} does not exist; type world.folder=FOLDER, the one in which "
-                f"{self.path} lies"
-            )
-        content = formats.read(Path(self.folder) / self.path, options)
+        content = formats.read(formats.located(self.folder, self.path), options)
         building = building_of(content, self._reading(content))
         bounds_m = self._checked_bounds(building)
         scene = Scene.from_mesh(building.vertices_m, building.triangles)
         return Survey(
-            path=str(Path(self.folder) / self.path),
+            path=self._file,
             content=content,
             building=building,
             flight_bounds_m=bounds_m,
@@ -91,12 +86,17 @@ class File:
             parts=free_parts(scene, bounds_m, self.clearance_m, building.space),
         )
 
+    @property
+    def _file(self) -> str:
+        """The file as messages name it."""
+        return str(Path(self.folder) / self.path)
+
     def _reading(self, content: formats.Content) -> Reading:
         bounds_m = None
         if self.flight_bounds_m is not None:
             bounds_m = np.array(self.flight_bounds_m) + np.array([[-MAP_MARGIN_M], [MAP_MARGIN_M]])
         return Reading(
-            frame=frame_of(content, str(Path(self.folder) / self.path), self.unit_m, self.up_axis),
+            frame=frame_of(content, self._file, self.unit_m, self.up_axis),
             voxel_size_m=self.voxel_size_m,
             wall_height_m=self.wall_height_m,
             unmeasured_is_solid=self.unknown == "wall",
@@ -132,7 +132,7 @@ class File:
             bounds = box + np.outer([1.0, -1.0], INSET_M)
             if not (bounds[0] < bounds[1]).all():
                 raise WorldError(
-                    f"{self.path}: the geometry is {text(box[1] - box[0])} m, too small to fly in; "
+                    f"{self._file}: the geometry is {text(box[1] - box[0])} m, too small to fly in; "
                     f"is world.unit_m={building.unit_m:g} right?"
                 )
         else:
@@ -140,7 +140,7 @@ class File:
             if (bounds[0] > box[1]).any() or (bounds[1] < box[0]).any():
                 box += building.origin_m
                 raise WorldError(
-                    f"{self.path}: the geometry reaches from {text(box[0])} to {text(box[1])} m, apart from "
+                    f"{self._file}: the geometry reaches from {text(box[0])} to {text(box[1])} m, apart from "
                     f"flight_bounds_m {text(bounds[0])} to {text(bounds[1])}; are unit_m and up_axis right?"
                 )
         return bounds

@@ -380,7 +380,5 @@ def test_unit_and_axis_do_not_apply_to_ros_maps() -> None:
 def test_a_file_is_looked_for_in_the_folder_and_a_missing_folder_is_told() -> None:
     start_to_target = read("flat.ply", folder=str(DATA)).shortest_path
     np.testing.assert_array_equal(start_to_target, read(DATA / "flat.ply").shortest_path)
-    with pytest.raises(
-        WorldError, match=r"^world\.folder=/no/where does not exist; type world\.folder=FOLDER"
-    ):
+    with pytest.raises(WorldError, match=r"^folder=/no/where does not exist; type world\.folder=FOLDER"):
         read("flat.ply", folder="/no/where")
