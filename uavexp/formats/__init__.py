@@ -14,8 +14,8 @@ from types import ModuleType
 import numpy as np
 
 from uavexp.errors import WorldError
-from uavexp.paths import expanded
 from uavexp.formats.base import FREE, SOLID, UNMEASURED, Cells, Content, Options
+from uavexp.paths import expanded
 
 __all__ = ["FREE", "READERS", "SOLID", "UNMEASURED", "Cells", "Content", "Options", "files", "read"]
 
