@@ -23,7 +23,8 @@ all that is mapped as long as the assumptions hold.
 
 **Assumptions.** What was seen as free is free and stays so: the map is wrong by less than `margin_m`
 and what is kept by the planner beyond it (a plate thinner than half a voxel, seen edge-on, may be
-missing), and nothing moves (movers are the planner's and the trigger's to avoid); the vehicle is on
+missing from `mapping=dense`; `dense_thin` has it), and nothing moves (movers are the planner's and the
+trigger's to avoid); the vehicle is on
 its reference but for an error below the same margin (the pace falls to 0 as the error comes to
 `stop_error_m`); the pose is right (drift is not seen). The start is free for `start_bubble_m` or as
 far as it is in truth, whichever is less; out of what was not seen around it the vehicle creeps, at
