@@ -15,6 +15,7 @@ from uavexp.check.fields import empty, field_from
 from uavexp.explorer.volume.cells import CLOSED, EDGE, NARROW, OPEN, UNSEEN, Body, Cells
 from uavexp.explorer.volume.clusters import clusters_of
 from uavexp.explorer.volume.route import ANY, WIDE, optimistic
+from uavexp.explorer.volume.views import Places, Sight, look_from, seen_from
 from uavexp.explorer.volume.waves import (
     FAR,
     Prices,
@@ -147,3 +148,24 @@ def test_cells_follow_the_voxels() -> None:
     assert not len(cells.frontier(1))
     assert len(cells.frontier(2)) == len(frontier)
     assert not len(cells.update())
+
+
+def test_sight_ends_at_walls_and_at_what_was_not_seen() -> None:
+    grid, unknown = empty((4.0, 3.0, 2.0)), empty((4.0, 3.0, 2.0))
+    grid[20, :15] = True  # a wall at x = 2.0 m, up to y = 1.5 m
+    unknown[30:] = True
+    field = field_from(grid & ~unknown, unknown=unknown, max_distance_m=2.0)
+    bounds_m = np.array([[0.3, 0.3, 0.3], [3.7, 2.7, 1.7]])
+    places = Places(
+        field.state, field.distance, field.origin_m, 0.1, 0.2, 0.28, 0.2, bounds_m[0], bounds_m[1]
+    )
+    sight = Sight(math.radians(45.0), math.radians(-36.8), math.radians(36.8), 4.5)
+    cells_m = np.array([[2.5, 1.0, 1.0], [2.5, 2.0, 1.0], [3.1, 2.0, 1.0], [3.6, 2.0, 1.0], [0.5, 2.0, 1.0]])
+    seen = seen_from(places, sight, np.array([1.0, 2.0, 1.0]), 0.0, cells_m)
+    # behind the wall, free, the first unseen, behind unseen ones, behind the eye
+    np.testing.assert_array_equal(seen, [False, True, True, False, False])
+    count, yaws = look_from(
+        places, sight, np.array([[1.0, 2.0, 1.0], [2.2, 1.0, 1.0], [3.6, 2.0, 1.0]]), cells_m[4:]
+    )
+    np.testing.assert_array_equal(count, [1, 0, 0])  # the second stands too near the wall, the third unseen
+    assert abs(yaws[0]) == pytest.approx(math.pi)
