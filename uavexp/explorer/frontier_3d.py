@@ -195,8 +195,9 @@ class Frontier3d:
         there = float(np.linalg.norm(choice.place_m - state.position_m)) <= _ARRIVED_M
         looks = there and not abs(turn) > _ARRIVED_RAD  # a sensor all around has no yaw
         short = float(np.linalg.norm(choice.leg_m - state.position_m)) > _ARRIVED_M
-        trajectory = observation.trajectory
-        ended = trajectory is not None and now_s >= max(trajectory.end_s, choice.made_s + _DWELL_S)
+        flown, trajectory = observation.goal, observation.trajectory
+        ended = trajectory is not None and flown is not None and now_s >= trajectory.end_s
+        ended = ended and flown is not None and np.array_equal(flown.position_m, choice.leg_m)
         if not looks and not (ended and short):
             self._there_since_s = math.inf
             return
