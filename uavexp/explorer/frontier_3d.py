@@ -78,8 +78,8 @@ class Frontier3d:
     narrow_clearance_m: NarrowClearance = (
         0.22  # m, of ways where min_clearance_m leaves none; 0: never [ours]
     )
-    min_cluster_cells: Count = 4  # fewer joined frontier cells are ignored [ours]
-    cluster_m: Positive = 1.6  # m, edge of the cubes into which frontiers are cut [ours]
+    min_cluster_cells: Count = 8  # fewer joined frontier cells are ignored [ours]
+    cluster_m: Positive = 2.4  # m, edge of the cubes into which frontiers are cut [ours]
     horizontal_fov_deg: Annotated[float, above(0), at_most(360)] = 90.0  # deg, of the sensor; 180 and more:
     # a LiDAR
     lowest_deg: Annotated[float, between(-90, 90)] = -36.8  # deg, elevation of the lowest that it sees

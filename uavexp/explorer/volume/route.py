@@ -23,8 +23,9 @@ from uavexp.explorer.volume.waves import (
 from uavexp.inspection.tour import open_tour
 
 _NEAREST = 6  # places to which ways are sought; those to farther ones lead through these
-_KICKS_PER_PLACE = 10
-PLACES = 40  # that a tour visits, the nearest; farther ones wait for the next
+_LONGER, _FARTHER_M = 1.5, 2.0  # ways between places are sought up to so many straight ones and so far more
+_KICKS_PER_PLACE = 1
+PLACES = 12  # that a tour visits, the nearest; farther ones wait for the next
 _MEMORY = 20_000  # pairs
 _NARROW_PRICE = 3.0
 # prices of the kinds of cells on ways over what was seen, without narrow places and with them
@@ -127,7 +128,8 @@ class Ways:
             near = np.argsort(straight[a], kind="stable")[1 : _NEAREST + 1]
             missing = [int(b) for b in near if (int(places[a]), int(places[b])) not in self._between]
             if missing:  # two places may share a cell
-                self._measure(int(places[a]), places[missing], over[a, missing])
+                most_m = np.minimum(over[a, missing], _LONGER * straight[a, missing] + _FARTHER_M)
+                self._measure(int(places[a]), places[missing], most_m)
             for b in near:
                 over[a, b] = over[b, a] = min(over[a, b], self._between[int(places[a]), int(places[b])])
         for via in range(count):  # Floyd and Warshall
