@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 
 from uavexp.metrics.metric import Metric
 from uavexp.report.comparison import Panel, estimate
@@ -91,4 +92,5 @@ def draw_estimate(axes: Axes, panel: Panel, metric: Metric, arm: str, **point: A
     axes.plot(found.mean, place, zorder=3, clip_on=False, **point)
     if found.n < panel.n(arm):
         at: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "fontsize": SMALL_PT}
-        axes.annotate(str(found.n), (found.mean, place), (0, 4), **at)
+        note = axes.annotate(str(found.n), (found.mean, place), (0, 4), **at)
+        note.set_path_effects([withStroke(linewidth=1.5, foreground="white")])  # it may stand on an axis
