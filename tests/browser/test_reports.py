@@ -8,6 +8,7 @@ import pytest
 
 from tests.browser.browser import Browser
 from tests.browser.conftest import SHOTS
+from tests.studies import copy_of
 from uavexp.report.make import make_report
 from uavexp.show.__main__ import main as show
 from uavexp.store.study import Study
@@ -23,8 +24,13 @@ _DRAWN = """new Promise(done => {
 
 
 @pytest.fixture(scope="module")
-def report(flown: Study) -> Path:
-    return make_report(flown.folder)[-1]
+def study(flown: Study, tmp_path_factory: pytest.TempPathFactory) -> Study:
+    return copy_of(flown, tmp_path_factory.mktemp("looked at") / "study")
+
+
+@pytest.fixture(scope="module")
+def report(study: Study) -> Path:
+    return make_report(study.folder)[-1]
 
 
 @pytest.mark.parametrize("width_px", WIDTHS_PX)
@@ -83,11 +89,11 @@ def test_the_flight_in_3d_begins_with_all_of_it_in_view(
 
 @pytest.mark.parametrize("width_px", DRAWN_PX)
 def test_the_page_of_flights_shows_them_without_a_complaint(
-    browser: Browser, shots: Path, flown: Study, width_px: int
+    browser: Browser, shots: Path, study: Study, width_px: int
 ) -> None:
-    page = flown.folder / "show.html"
+    page = study.folder / "show.html"
     if not page.is_file():
-        assert show([str(flown.folder), "--out", str(page)]) == 0
+        assert show([str(study.folder), "--out", str(page)]) == 0
     seen = browser.look(page.as_uri(), width_px=width_px, settle_s=0.5)
     (shots / f"show-{width_px}.png").write_bytes(seen.png)
     assert seen.errors == []

@@ -12,12 +12,16 @@ from uavexp.report.contents import Report, missing
 from uavexp.report.figures.base import Drawing
 from uavexp.report.html_failed import failed_trials
 from uavexp.report.html_head import head
-from uavexp.report.html_parts import figure, paragraph, table, verdicts
+from uavexp.report.html_parts import figure, kept_figure, paragraph, table, verdicts
 from uavexp.store.records import write_text
 
 
 def write_html(
-    report: Report, drawings: Sequence[tuple[Drawing, Path]], path: Path, left_out: Sequence[str] = ()
+    report: Report,
+    drawings: Sequence[tuple[Drawing, Path]],
+    path: Path,
+    left_out: Sequence[str] = (),
+    kept: Sequence[Path] = (),
 ) -> None:
     """Write the page of a report; the same study gives the same bytes.
 
@@ -26,6 +30,7 @@ def write_html(
         drawings: finished figures with their PNG files.
         path: of the page. Pictures of trials and pdf figures are linked relative to the study.
         left_out: sentences: which figure is left out, and why.
+        kept: PNG files of figures that an earlier report drew and this one cannot.
 
     Raises:
         RecordError: it cannot be written.
@@ -35,7 +40,8 @@ def write_html(
     except RecordError as error:
         flight, left_out = "", [*left_out, missing("a flight in 3D", error, report.study)]
     tables = [table(made) for made in report.tables]
-    figures = [*(figure(drawing, png) for drawing, png in drawings), *map(paragraph, left_out)]
+    shown_figures = [figure(drawing, png) for drawing, png in drawings]
+    figures = [*shown_figures, *map(kept_figure, kept), *map(paragraph, left_out)]
     sections = {
         "Verdicts": verdicts(report.judgements) if report.judgements else "",
         "Result": "\n".join(tables[:1]),

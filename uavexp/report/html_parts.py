@@ -74,14 +74,31 @@ def row(cells: Iterable[str]) -> str:
 
 def figure(drawing: Drawing, png: Path) -> str:
     """A figure in the page, a link to its pdf below it."""
-    name = drawing.name.replace("_", " ").capitalize()
+    return _figure(png, drawing.name, drawing.figure.get_figwidth(), drawing.caption)
+
+
+def kept_figure(png: Path) -> str:
+    """A figure of an earlier report in the page, and the sentence that says so."""
+    from PIL import Image
+
+    with Image.open(png) as image:
+        width_in = image.width / float(image.info.get("dpi", (_DPI, _DPI))[0])
+    return _figure(png, png.stem, width_in, _KEPT)
+
+
+_KEPT = "Drawn by an earlier report: the flights it shows are not whole in this folder any more."
+_DPI = 200.0  # of figures, where a file does not tell
+_ZOOM = 1.25  # of a printed page's inches on a screen
+
+
+def _figure(png: Path, stem: str, width_in: float, caption: str) -> str:
+    name = stem.replace("_", " ").capitalize()
     data = base64.b64encode(png.read_bytes()).decode("ascii")
     pdf = png.with_suffix(".pdf")
     link = f' <a href="{escape(f"{pdf.parent.name}/{pdf.name}")}">pdf</a>' if pdf.is_file() else ""
-    width_in = 1.25 * drawing.figure.get_figwidth()
     return (
-        f'<figure id="{escape(drawing.name)}">\n'
-        f'<div class="pan"><img alt="{escape(name)}" style="--width:{width_in:.2f}in" '
+        f'<figure id="{escape(stem)}">\n'
+        f'<div class="pan"><img alt="{escape(name)}" style="--width:{_ZOOM * width_in:.2f}in" '
         f'src="data:image/png;base64,{data}"></div>\n'
-        f"<figcaption><b>{escape(name)}.</b> {escape(drawing.caption)}{link}</figcaption>\n</figure>"
+        f"<figcaption><b>{escape(name)}.</b> {escape(caption)}{link}</figcaption>\n</figure>"
     )

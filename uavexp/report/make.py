@@ -8,7 +8,7 @@ The same trials give the same bytes.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import IO, Any
 
@@ -126,11 +126,23 @@ def _write_figures_and_page(report: Report, say: Say, warn: Say) -> Iterator[Pat
         png, pdf = _write_figure(drawing, folder / FIGURES)
         drawn.append((drawing, png))
         yield from (png, pdf)
+    kept = list(_kept(report, folder, [drawing.name for drawing, _ in drawn]))
+    left_out = [line for line in left_out if line.split(" ")[0] not in {png.stem for png in kept}]
     say("page")
     for line in left_out:
         warn(line)
-    write_html(report, drawn, folder / PAGE, left_out)
+    write_html(report, drawn, folder / PAGE, left_out, kept)
+    for png in kept:
+        yield from filter(Path.is_file, (png, png.with_suffix(".pdf")))
     yield folder / PAGE
+
+
+def _kept(report: Report, folder: Path, drawn: Sequence[str]) -> Iterator[Path]:
+    """Figures that cannot be drawn any more, as the logs of their flights are gone, but lie there yet."""
+    for part in report.declared.figures:
+        png = folder / FIGURES / f"{part.name}.png"
+        if part.name not in drawn and png.is_file():
+            yield png
 
 
 def _write_figure(drawing: Drawing, folder: Path) -> tuple[Path, Path]:

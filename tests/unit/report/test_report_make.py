@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import os
 import subprocess
@@ -12,6 +13,7 @@ from pathlib import Path
 import pandas as pd
 import pyarrow as pa
 import pytest
+from PIL import Image
 from pyarrow import parquet
 
 from tests.studies import copy_of, shipped
@@ -185,3 +187,20 @@ def test_tables_older_than_a_record_are_collected_again(
     with pytest.raises(RecordError, match="damaged"):  # the record is read: it holds nothing
         make._bring_up_to_date(make.read_study(folder), lines.append)
     assert lines == ["collecting 1 records"]
+
+
+def test_a_figure_whose_logs_are_gone_is_kept_and_says_so(tmp_path: Path) -> None:
+    """Used to vanish from the page, though its file lay in the folder."""
+    folder = write_study(tmp_path / "study")  # without a log
+    (folder / make.FIGURES).mkdir()
+    png = folder / make.FIGURES / "figure_3.png"
+    Image.new("RGB", (400, 200)).save(png, dpi=(200, 200))
+    before = png.read_bytes()
+    assert png in make.make_report(folder)
+    page = (folder / make.PAGE).read_text()
+    assert png.read_bytes() == before
+    assert base64.b64encode(before).decode() in page
+    assert "the flights it shows are not whole in this folder any more" in page
+    assert "figure_3 is left out" not in page
+    assert "figure_4 is left out" in page
+    assert png in make.make_report(folder)  # nor does the next report take it for its own and remove it
