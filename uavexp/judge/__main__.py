@@ -34,6 +34,8 @@ def main(arguments: Sequence[str]) -> int:
 
 def _judge(arguments: Sequence[str]) -> int:
     options = _parser().parse_intermixed_args(arguments)
+    if options.file is None:
+        raise ConfigError("a file is needed; see --help")
     if options.settings and options.world is None:
         raise ConfigError(f"{options.settings[0]} says how a building is read: name it with --world")
     for setting in options.settings:
@@ -74,7 +76,7 @@ def _parser() -> argparse.ArgumentParser:
         description="Judges a recorded flight by the metrics of every flight; nothing is flown.",
         epilog="files: " + ", ".join(READERS) + ", or the folder of a ROS 2 bag",
     )
-    parser.add_argument("file", type=Path, metavar="FILE")
+    parser.add_argument("file", type=Path, nargs="?", metavar="FILE")
     parser.add_argument(
         "settings",
         nargs="*",

@@ -40,6 +40,8 @@ def main(arguments: Sequence[str]) -> int:
 
 def _replay(arguments: Sequence[str]) -> int:
     options = _parser().parse_intermixed_args(arguments)
+    if options.folder is None:
+        raise ConfigError("a folder of depth images or a bag is needed; see --help")
     for text in options.overrides:
         if (key := text.partition("=")[0].split(".")[0]) in _NO_PART:
             raise ConfigError(
@@ -145,6 +147,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "folder",
         type=Path,
+        nargs="?",
         metavar="FOLDER",
         help="depth images with poses.txt, TUM's form, or a ROS bag",
     )

@@ -251,6 +251,7 @@ def test_a_building_that_is_another_frame_is_refused(tmp_path, capsys):
     trimesh.util.concatenate(shells).export(walls)
     (tmp_path / "through.csv").write_text(recordings.csv_text(time_s, position_m))
     assert "goes through surfaces" in refusal(capsys, tmp_path / "through.csv", "--world", walls)
+    assert "a file is needed" in refusal(capsys)
     assert "does not exist" in refusal(capsys, tmp_path / "through.csv", "--world", tmp_path / "no.stl")
     assert "name it with --world" in refusal(capsys, tmp_path / "through.csv", "world.unit_m=1")
 

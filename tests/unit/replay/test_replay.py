@@ -216,6 +216,7 @@ def test_a_bad_recording_is_one_line(what, said, recorded, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
+        ([], "a folder of depth images or a bag is needed"),
         (["nowhere"], "there is no such folder"),
         (["FOLDER", "strategy=mrc"], "did you mean"),
         (["FOLDER", "world=rooms"], "a recording has no world"),
