@@ -9,6 +9,7 @@ import os
 import shutil
 import zipfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +21,9 @@ from tests.fuzz.folders import READERS, faults_of
 from tests.fuzz.watch import in_time
 from tests.sweeps import QUICK
 from uavexp.__main__ import main as fly
-from uavexp.errors import RecordError, UavexpError
+from uavexp.errors import ConfigError, RecordError, UavexpError
 from uavexp.report.__main__ import main as report
+from uavexp.report.declared import declared
 from uavexp.store.log_shapes import EVENTS, NEEDED, OPTIONAL
 from uavexp.store.logs import log_arrays, pack, read_log, unpack
 from uavexp.store.records import read_record, seal
@@ -188,3 +190,24 @@ def test_an_array_that_claims_more_than_its_bytes_is_damaged(tmp_path: Path) -> 
 def test_a_spoilt_folder_is_read_or_refused(seed: int, recorded: Path, tmp_path: Path) -> None:
     with in_time(60.0):
         assert faults_of(recorded, tmp_path / "place", seed, readers=3) == []
+
+
+@pytest.mark.parametrize(
+    ("report", "words"),
+    [
+        ({"claims": [{"says": "{first.__class__}", "source": "s", "metric": "success", "arms": ["a", "b"]}]},
+         "is none of first"),
+        ({"claims": [{"says": "{label:>999999999}", "source": "s", "metric": "success", "arms": ["a", "b"]}]},
+         "is none of first"),
+        ({"claims": [{"says": "s", "source": "s", "metric": "success", "arms": ["a"]}]}, "needs arms"),
+        ({"claims": [{"says": "s", "source": "s", "metric": "success", "each": 5}]}, "must be a list"),
+        ({"tables": [{"by_arm": {"metrics": 5}}]}, "must be a list"),
+        ({"tables": ["os.path"]}, "is refused"),
+    ],
+)  # fmt: skip
+def test_a_report_of_a_stranger_is_refused_in_one_line(
+    report: dict[str, Any], words: str, recorded: Path
+) -> None:
+    """A statement's {first.__class__...} is read by Python's format, which hands out what it finds."""
+    with pytest.raises(ConfigError, match=words):
+        declared(replace(read_study(recorded), report=report))

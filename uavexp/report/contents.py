@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from uavexp.errors import RecordError, one_line
+from uavexp.errors import ConfigError, RecordError, one_line
 from uavexp.report import style
 from uavexp.report.declared import Claim, Declared, declared, results_of
 from uavexp.report.figures.base import Drawing
@@ -113,10 +113,13 @@ def _judge(results: Results, claim: Claim) -> Judgement | None:
     there = set(claim.arms) <= set(part.arms) and all(part.panel.has(metric) for metric in claim.metrics)
     if not there and claim.is_one_of_many:
         return None
-    verdict, evidence = (
-        claim.judge(part, **claim.options) if there else (Verdict.NOT_TESTABLE, _lacking(part, claim))
-    )
-    statement = claim.says.format(**_words(results, claim))
+    try:
+        verdict, evidence = (
+            claim.judge(part, **claim.options) if there else (Verdict.NOT_TESTABLE, _lacking(part, claim))
+        )
+        statement = claim.says.format(**_words(results, claim))
+    except (ValueError, KeyError, IndexError) as error:  # a number of arms, or a word, that it does not have
+        raise ConfigError(f"claims: {claim.says!r} cannot be judged: {one_line(error)}") from error
     return Judgement(statement=statement, source=claim.source, verdict=verdict, evidence=evidence)
 
 

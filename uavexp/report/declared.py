@@ -22,12 +22,13 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from string import Formatter
 from typing import Any
 
 from uavexp.config.trust import is_trusted, trusted_packages
 from uavexp.errors import ConfigError
 from uavexp.metrics.metric import Metric
-from uavexp.parameters import nearest
+from uavexp.parameters import check_value, nearest, parameter_types
 from uavexp.report import judges
 from uavexp.report.labels import TABLE_1, metrics_of
 from uavexp.report.results import Results
@@ -38,6 +39,8 @@ _TABLE_1 = [metric.column for metric in TABLE_1]
 _SUMMARY = {"name": "summary", "metrics": [*_TABLE_1, "detour", "time_below_safety_s"]}
 _DEFAULTS: dict[str, list[Any]] = {TABLES: [{"by_arm": _SUMMARY}], FIGURES: ["success"], CLAIMS: []}
 _FILE_NAME = re.compile(r"\w{1,100}")
+_WORDS = ("first", "second", "label", "printed")  # that a statement may name
+_SPEC = re.compile(r"(\.\d)?[fg%]?")
 _CLAIM_KEYS = ("says", "source", "judge", "among", "each")
 
 
@@ -85,7 +88,7 @@ def declared(study: Study) -> Declared:
         ConfigError: something in it is unknown.
     """
     lists = {kind: study.report.get(kind, default) for kind, default in _DEFAULTS.items()}
-    default = metrics_of(study.settings.get("metrics", _TABLE_1))
+    default = _metrics("settings", study.settings.get("metrics", _TABLE_1))
     return Declared(
         tables=tuple(_part(TABLES, item, default) for item in lists[TABLES]),
         figures=tuple(_part(FIGURES, item, default) for item in lists[FIGURES]),
@@ -163,8 +166,12 @@ def _claims(item: Any) -> Iterator[Claim]:
         )
     judge = judges.JUDGES[name]
     given = {key: value for key, value in item.items() if key not in _CLAIM_KEYS}
-    groups = item.get("each", [given.get("arms", ())])
+    groups = check_value(f"{where}: each", item.get("each", [given.get("arms", [])]), list[list[str]])
+    check_value(f"{where}: among", item.get("among", {}), dict[str, str])
+    if not groups or any(len(arms) < 2 for arms in groups if judge is judges.better):
+        raise ConfigError(f"{where}: needs arms: [FIRST, SECOND]")
     options, metrics = _checked(where, judge, {**given, "arms": groups[0]} if "each" in item else given)
+    _check_words(where, str(item["says"]), [*groups[0], *metrics])
     for arms in groups:
         yield Claim(
             says=str(item["says"]),
@@ -176,6 +183,21 @@ def _claims(item: Any) -> Iterator[Claim]:
             is_one_of_many="each" in item,
             metrics=metrics,
         )
+
+
+def _check_words(where: str, says: str, about: Sequence[Any]) -> None:
+    """Refuse a statement that names more than its arms, the label of its metric and the printed number."""
+    try:
+        fields = [(name, spec) for _, name, spec, _ in Formatter().parse(says) if name is not None]
+    except ValueError as error:
+        raise ConfigError(f"{where}: {error}") from error
+    for name, spec in fields:
+        if name not in _WORDS or not about or not _SPEC.fullmatch(spec or "") or (spec and name != "printed"):
+            raise ConfigError(f"{where}: {{{name}}} is none of {', '.join(_WORDS)} (with a claim about arms)")
+
+
+def _metrics(where: str, names: Any) -> tuple[Metric, ...]:
+    return metrics_of(check_value(f"{where}: metrics", names, list[str]))
 
 
 def _checked(
@@ -191,11 +213,15 @@ def _checked(
     missing = [key for key, one in known.items() if one.default is one.empty and key not in options]
     if missing:
         raise ConfigError(f"{where}: needs {', '.join(missing)}")
-    found: dict[str, Any] = dict(options)
+    types = parameter_types(function)
+    found: dict[str, Any] = {
+        key: value if key in ("metric", "metrics") else check_value(f"{where}: {key}", value, types[key])
+        for key, value in options.items()
+    }
     if "metrics" in found:
-        found["metrics"] = metrics_of(found["metrics"])
+        found["metrics"] = _metrics(where, found["metrics"])
     if "metric" in found:
-        (found["metric"],) = metrics_of([found["metric"]])
+        (found["metric"],) = _metrics(where, [found["metric"]])
     return found, (*found.get("metrics", ()), *([found["metric"]] if "metric" in found else ()))
 
 

@@ -12,7 +12,7 @@ from uavexp.errors import RecordError
 from uavexp.log import TrialLog
 from uavexp.report.comparison import SCENE
 from uavexp.report.results import ARM, OK, Results
-from uavexp.store.study import TRIALS, WORLDS
+from uavexp.store.study import TRIALS, WORLDS, trial_folders
 from uavexp.types import World
 
 _KIND = "scene_kind"  # column of inspections: what the reference does not show
@@ -66,7 +66,7 @@ def stored(results: Results) -> pd.DataFrame:
         return flights.iloc[:0]
     worlds = {file.stem for file in (study.folder / WORLDS).glob("*.npz")}
     there = flights[(flights["status"] == OK) & flights["world_digest"].isin(worlds)]
-    folders = {folder.name for folder in (study.folder / TRIALS).glob("*")}
+    folders = {folder.name for folder in trial_folders(study.folder)}
     there = there[there["trial"].isin(folders)]
     return there[there["trial"].map(study.has_log).astype(bool)]
 

@@ -14,6 +14,7 @@ so that a trial repeated by itself has the same record.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
 STUDY, RUN = "study.json", "run.json"
 TRIALS, WORLDS = "trials", "worlds"
 ASIDE = ".aside-"
+_TRIAL = re.compile(r"[\w-][\w.-]*", re.ASCII)  # a trial's name (`records.trial_name`)
 _MOST_CELLS = 500_000_000  # of a table
 _MOST_WORDS = 300  # of what a library says of a bad file
 _REPORTED = ("p_trigger_", "p_planner_unknown")  # parameters that figures and notes show
@@ -196,9 +198,9 @@ def _with_delays(record: dict[str, Any], log: Path) -> dict[str, Any]:
 
 
 def trial_folders(folder: Path) -> Iterator[Path]:
-    """Folders of the trials that stand in a study folder, by name; none set aside, none half-written."""
+    """Folders of the trials that stand in a study folder, by name; none set aside, half-written or a link."""
     for item in sorted((folder / TRIALS).glob("*")):
-        if item.is_dir() and not item.name.startswith(".") and ASIDE not in item.name:
+        if _TRIAL.fullmatch(item.name) and ASIDE not in item.name and item.is_dir() and not item.is_symlink():
             yield item
 
 
