@@ -144,7 +144,7 @@ def test_a_checked_configuration_builds_again() -> None:
         ("mapping.esdf_rate_hz=7", ["mapping.esdf_rate_hz", "whole multiple"]),
         ("latency_s=0.025", ["latency_s", "whole multiple of step_s"]),
         ("latency_s=-0.01", ["latency_s must be >= 0"]),
-        ("step_s=0", ["step_s must be > 0"]),
+        ("step_s=0", ["step_s must be 0.0001 to 0.1"]),
         ("step_s=ten", ["step_s must be a number, got 'ten'"]),
         ("sensor.axial_noise=1", ["true or false"]),
         ("world.size_m=20,12,3", ["world.size_m", "got 20"]),
