@@ -17,7 +17,7 @@ from matplotlib.patches import Patch
 
 from uavexp.log import TrialLog
 from uavexp.metrics import replanning
-from uavexp.report import inspection_view, movers_view, plan_view, replan_marks, style
+from uavexp.report import inspection_view, movers_view, plan_view, replan_marks, search_view, style
 from uavexp.report.picture_layout import LEFT_IN, WIDTH_IN, Page, lay_out
 from uavexp.types import World
 
@@ -51,6 +51,8 @@ def draw(world: World, log: TrialLog, metrics: Values, title: str, path: Path | 
         FigureCanvasAgg(sheet.figure)
         draw_plan = inspection_view.draw if inspects else plan_view.draw
         speed_scale = draw_plan(sheet.plan, world, log, view)
+        if not inspects:
+            search_view.draw(sheet.plan, world, log)
         movers_view.draw_near_misses(sheet.plan, log, near_miss_m)
         _draw_speed_bar(sheet.speed_bar, speed_scale)
         _draw_clearance(sheet.clearance, log, _number(metrics, "safety_threshold_m"), near_miss_m)
@@ -146,6 +148,7 @@ def _handles(world: World, log: TrialLog) -> list[Line2D | Patch]:
         Line2D(
             [], [], color=style.YELLOW, marker="*", ls="", mec=style.BLACK, mew=0.8, ms=12, label="target"
         ),
+        *search_view.handles(world, log),
         *_event_handles(log),
     ]
 
