@@ -51,12 +51,13 @@ def _found(report: Report) -> Iterator[str]:
     if report.judgements:
         yield f"Claims of the paper: {counted(report.judgements)}."
     panel = report.results.panel
-    rates = [
-        f"{arm} {number_format.mean_with_interval(estimate(panel, RATE, arm), RATE, panel.n(arm))}"
-        for arm in panel.arms[:_MOST_ARMS]
-    ]
-    more = f"; {len(panel.arms) - _MOST_ARMS} more below" if len(panel.arms) > _MOST_ARMS else ""
-    yield f"Success in %, with its 95 % interval: {'; '.join(rates)}{more}."
+    rates = {arm: estimate(panel, RATE, arm) for arm in panel.arms}
+    named = list(rates)
+    if len(rates) > _MOST_ARMS:
+        named = [end(named, key=lambda arm: rates[arm].mean) for end in (min, max)]
+        yield f"{len(rates)} configurations; the one that succeeded least and the one that did most:"
+    told = [f"{arm} {number_format.mean_with_interval(rates[arm], RATE, panel.n(arm))}" for arm in named]
+    yield f"Success in %, with its 95 % interval: {'; '.join(told)}."
 
 
 _MOST_ARMS = 6  # named in the head

@@ -278,3 +278,18 @@ def test_voxels_survive_packing(count):
     cells = np.unique(rng.integers(-40, 40, (count, 3)), axis=0)
     packed = flight3d.voxels((0.05 + 0.1 * cells).astype(np.float32))
     np.testing.assert_allclose(centres(packed), 0.05 + 0.1 * cells, atol=1e-3)
+
+
+def test_of_many_configurations_the_head_names_the_two_ends(tmp_path):
+    arms = [f"arm {number}" for number in range(9)]
+    rows = pd.DataFrame({"cell": np.repeat(arms, 8), "seed": np.tile(range(8), 9), "status": "ok"})
+    rows["success"] = rows["seed"] < np.repeat(range(9), 8)
+    rows["outcome"] = np.where(rows["success"], "reached", "stuck")
+    rows["trial"] = [f"t{number}" for number in range(len(rows))]
+    rows["strategy"] = rows["world"] = "x"
+    words = Page(written(made_up(tmp_path, rows, {"cell": tuple(arms)}))).words
+    head = words[: words.index("A <table>")]
+    assert "9 configurations" in head
+    assert "arm 0 0.0 [" in head
+    assert "arm 8 100.0 [" in head
+    assert "arm 4 50.0" not in head
