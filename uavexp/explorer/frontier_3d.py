@@ -30,7 +30,7 @@ import numpy as np
 from uavexp.arrays import Bool, Float, Int
 from uavexp.errors import require
 from uavexp.explorer.volume.cells import Body, Cells
-from uavexp.explorer.volume.route import ANY, WIDE, Ways, optimistic
+from uavexp.explorer.volume.route import ANY, NARROWER, WIDE, Ways, optimistic
 from uavexp.explorer.volume.space import Candidates, Space, leg_is_done
 from uavexp.explorer.volume.viewpoints import Cluster, Viewpoints
 from uavexp.explorer.volume.views import Places, Sight
@@ -221,10 +221,10 @@ class Frontier3d:
         return bool(wanted.mean() > self.covered_share and space.viewpoints.is_place(choice.place_m))
 
     def _chosen(self, space: Space, observation: Observation) -> _Choice | None:
-        """The target if seen cells lead there, else the best place; over narrow ones if there is no other."""
+        """The target if seen cells lead there, else the best place; over worse ways if there is no other."""
         here_m, target_m = observation.state.position_m, observation.target_m
         clusters = space.viewpoints.clusters(self.looks, here_m)
-        for known in (WIDE, ANY):
+        for known in (WIDE, NARROWER, ANY):
             space.ways.begin(space.cell_of(here_m), known)
             to_target_m = space.to_target_m()
             if target_m is not None and math.isfinite(to_target_m) and not self._aside_of(target_m[None])[0]:

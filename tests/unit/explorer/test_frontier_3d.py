@@ -174,3 +174,14 @@ def test_what_is_kept_between_choices_follows_the_map() -> None:
         assert (goal is None) == (anew is None)
         if goal is not None and anew is not None:
             assert goal.score == pytest.approx(anew.score, abs=0.5)
+
+
+def test_a_start_of_which_not_all_around_was_seen_is_left() -> None:
+    """An exploration used to end there after two seconds."""
+    whole = storeys(0.0)
+    state = whole.state.copy()
+    x, y, z = np.meshgrid(*(0.05 + 0.1 * np.arange(n) for n in state.shape), indexing="ij")
+    away_m = np.sqrt((x - START_M[0]) ** 2 + (y - START_M[1]) ** 2 + (z - START_M[2]) ** 2)
+    state[(away_m > 0.3) & (away_m < 0.38)] = UNKNOWN
+    goal = begun().select(at(replace(whole, state=state), START_M))
+    assert goal is not None

@@ -10,6 +10,7 @@ from uavexp.arrays import Float, Int, Int32
 from uavexp.explorer.volume.cells import Cells
 from uavexp.explorer.volume.waves import (
     FAR,
+    MOST_PRICE,
     UNIT,
     Prices,
     Wave,
@@ -28,9 +29,11 @@ _KICKS_PER_PLACE = 1
 PLACES = 12  # that a tour visits, the nearest; farther ones wait for the next
 _MEMORY = 20_000  # pairs
 _NARROW_PRICE = 3.0
-# prices of the kinds of cells on ways over what was seen, without narrow places and with them
+# prices of the kinds of cells on ways over what was seen: without narrow places, with them, and with
+# places of which not all around was seen, as that of the start
 WIDE = Prices(np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0]), np.ones(6))
-ANY = Prices(np.array([0.0, 0.0, 0.0, 1.0, 0.0, _NARROW_PRICE]), np.ones(6))
+NARROWER = Prices(np.array([0.0, 0.0, 0.0, 1.0, 0.0, _NARROW_PRICE]), np.ones(6))
+ANY = Prices(np.array([0.0, 0.0, MOST_PRICE, 1.0, 0.0, _NARROW_PRICE]), np.ones(6))
 
 
 def optimistic(unseen: float, climb: float) -> Prices:
