@@ -9,11 +9,13 @@ import numpy as np
 
 from uavexp.arrays import Float
 from uavexp.braking import braking_trajectory
+from uavexp.geometry import GRAVITY_MPS2, rotation_from_quaternion
 from uavexp.pace import AS_PLANNED, Pace, delayed, evaluate_paced
 from uavexp.safety.base import Guard
 from uavexp.trajectory import Trajectory, evaluate
 from uavexp.types import Goal, Limits, Observation, Squeeze
 
+_LEAST_UP = 0.5
 _BEGUN_M = 0.1  # a plan that comes so far moves
 
 
@@ -72,9 +74,15 @@ class Flown:
 
 
 def stopped_off(observation: Observation, limits: Limits) -> Flown:
-    """A stop of a vehicle that is off its reference, from where it is, straight ahead."""
-    state = observation.state
-    start = (observation.time_s, state.position_m, state.velocity_mps, np.zeros(3))
+    """A stop of a vehicle that is off its reference, from where it is, as accelerated as it is tilted.
+
+    A vehicle that was catching up is tilted; a stop that took it for level would be left behind at once.
+    """
+    state, most_mps2 = observation.state, limits.max_acceleration_mps2
+    up = rotation_from_quaternion(state.quaternion_wxyz)[:, 2]
+    tilt = GRAVITY_MPS2 * np.array([up[0], up[1], 0.0]) / max(up[2], _LEAST_UP)
+    acceleration = tilt * min(1.0, most_mps2 / max(float(np.linalg.norm(tilt)), 1e-9))
+    start = (observation.time_s, state.position_m, state.velocity_mps, acceleration)
     return Flown(trajectory=braking_trajectory(*start, limits))
 
 

@@ -72,6 +72,7 @@ class HoldingPilot:
     failure: str = ""
     _pending: Flown | None = None  # a plan waiting for its latency to pass
     _wait_for_rest: bool = False  # after the safety's brake: no new plan before standstill
+    _stopped_s: float = -math.inf  # when it stopped where it was last
     _touched_s: float = -math.inf  # when something was touched last
     _held_m: Float | None = None  # (3,) where the safety held the vehicle last
 
@@ -228,7 +229,8 @@ class HoldingPilot:
         start_s = observation.time_s + self.crew.latency_s
         state = observation.state
         position_m, velocity_mps, acceleration_mps2 = self._planned_state(start_s)
-        far = error_of(observation) >= self.rules.restart_error_m or self._waits_s(start_s) > 0.0
+        left = error_of(observation) >= self.rules.restart_error_m and self._stopped_s < observation.time_s
+        far = left or self._waits_s(start_s) > 0.0
         if far or observation.field.distance_m(position_m[None])[0] <= 0.0:
             position_m = state.position_m + self.crew.latency_s * state.velocity_mps
             velocity_mps, acceleration_mps2 = state.velocity_mps, np.zeros(3)
@@ -333,6 +335,7 @@ class HoldingPilot:
             return None
         self.failure = f"the vehicle was {error_m:.2f} m from its reference"
         self._pending, self.flown = None, stopped_off(observation, self.crew.limits)
+        self._stopped_s = observation.time_s
         if not touches:
             return causes.BEHIND
         self._touched_s = observation.time_s

@@ -11,6 +11,7 @@ from tests.unit.pilot.test_holding import room
 from uavexp.check.fields import box, empty, field_from
 from uavexp.check.hall import LIMITS, hovering, observe
 from uavexp.pilot.back_up import back_up, remembered, way_back
+from uavexp.pilot.flown import stopped_off
 from uavexp.pilot.heading import room_to_turn
 from uavexp.pilot.touch import BALL_M, Touch, touched_m
 from uavexp.trajectory import evaluate
@@ -95,3 +96,18 @@ def test_the_obstacle_is_noted_beyond_the_body_and_only_where_none_is_mapped() -
 def test_there_is_room_to_turn_where_the_circle_of_the_corners_fits(half_m: float) -> None:
     here = np.array([7.0, 2.0, 1.0])
     assert room_to_turn(field_from(corridor_to(half_m)), here, LIMITS) is (half_m > LIMITS.body_radius_m)
+
+
+@pytest.mark.parametrize("tilt_rad", [0.0, 0.15, 0.6])
+def test_a_stop_off_the_reference_begins_with_the_acceleration_that_the_tilt_gives(tilt_rad: float) -> None:
+    """Taken for level, a vehicle that was catching up used to be left behind again at once."""
+    seen = pressed(0.5, speed_mps=-0.8)
+    tilted = np.array([np.cos(0.5 * tilt_rad), 0.0, np.sin(0.5 * tilt_rad), 0.0])
+    flown = stopped_off(replace(seen, state=replace(seen.state, quaternion_wxyz=tilted)), LIMITS)
+    at, velocity, acceleration = (row[0] for row in evaluate(flown.trajectory, np.array([1.0])))
+    np.testing.assert_allclose(at, seen.state.position_m)
+    np.testing.assert_allclose(velocity, [-0.8, 0.0, 0.0])
+    wanted = min(9.81 * np.tan(tilt_rad), LIMITS.max_acceleration_mps2)
+    np.testing.assert_allclose(acceleration, [wanted, 0.0, 0.0], atol=1e-9)
+    end = evaluate(flown.trajectory, np.array([flown.trajectory.end_s]))
+    np.testing.assert_allclose(end[1][0], 0.0, atol=1e-9)
