@@ -281,7 +281,7 @@ class Frontier3d:
             first = int(np.argmin(cost_m))
         if not math.isfinite(cost_m[first]):
             return None
-        if kept is not None and going_on[first]:
+        if kept is not None and going_on[first] and space.leads_to(kept.place_m):
             place_m, shown = kept.place_m, (kept.cells, kept.yaw_rad)
         else:
             place_m, shown = found.eyes_m[first], self._shown(space, found, first)

@@ -25,6 +25,7 @@ from uavexp.explorer.volume.waves import (
     new_wave,
     reach,
     steps_on,
+    trace,
 )
 
 SHAPE = (9, 8, 6)
@@ -96,6 +97,21 @@ def test_no_way_that_costs_more_than_asked_for_is_found_and_it_is_later() -> Non
     begin(wave, ends[0])
     assert reach(wave, kind.reshape(-1), STEPS, WIDE, ends[1], 599) == FAR
     assert reach(wave, kind.reshape(-1), STEPS, WIDE, ends[1], 600) == 600
+
+
+def test_a_way_is_traced_back_and_ends_where_none_leads() -> None:
+    """Used to search for ever where the wave had not been."""
+    kind, wave = np.zeros(SHAPE, np.uint8), new_wave(int(np.prod(SHAPE)))
+    kind[1:-1, 1:-1, 1:-1] = OPEN
+    kind[4] = CLOSED
+    start, near, beyond = (
+        int(np.ravel_multi_index(cell, SHAPE)) for cell in ((1, 1, 1), (3, 3, 1), (7, 1, 1))
+    )
+    begin(wave, start)
+    assert asked(wave, kind, WIDE, (near, beyond)).tolist() == [282.0, np.inf]
+    way = trace(wave, kind.reshape(-1), STEPS, WIDE, near)
+    assert way.tolist() == [start, int(np.ravel_multi_index((2, 2, 1), SHAPE)), near]
+    assert trace(wave, kind.reshape(-1), STEPS, WIDE, beyond).tolist() == [beyond]
 
 
 def test_clusters_are_scipys_parts_cut_into_cubes() -> None:

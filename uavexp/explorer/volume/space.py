@@ -114,6 +114,10 @@ class Space:
         look_m = np.linalg.norm(self.cells.centre_m(middle) - first_m, axis=1)
         return np.asarray(look_m + self.ways.beyond_m(middle))
 
+    def leads_to(self, place_m: Float) -> bool:
+        """Whether a way over what was seen leads to a place (3,)."""
+        return bool(np.isfinite(self.ways.there_m(np.array([self.cell_of(place_m)]))[0]))
+
     def leg_m(self, from_m: Float, to_m: Float, before_m: Float | None) -> Float:
         """Where (3,) the next leg to a place ends; the one before, while it holds."""
         field = self.cells.field

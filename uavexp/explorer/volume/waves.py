@@ -175,11 +175,12 @@ def reach_all(wave: Wave, kind: UInt8, steps: Steps, price: Prices, goals: Int, 
 
 @nb.njit(cache=True)
 def trace(wave: Wave, kind: UInt8, steps: Steps, price: Prices, goal: int) -> Int:
-    """Cells (P,) of the way to a cell that was reached, the source first."""
+    """Cells (P,) of the way to a cell, the source first; of one that was not reached, that cell alone."""
     cost = wave.cost
-    way, count = np.empty(wave.clock[_LEFT] + 2, np.int64), 1
+    way, count, before = np.empty(wave.clock[_LEFT] + 2, np.int64), 1, 0
     way[0] = at = goal
-    while cost[at] > 0 and count < way.shape[0]:
+    while cost[at] > 0 and before < count < way.shape[0]:
+        before = count
         for n in range(steps.offset.shape[0]):
             near = at - steps.offset[n]
             if cost[near] < cost[at] and (
