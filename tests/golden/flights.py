@@ -49,8 +49,7 @@ FLIGHTS: dict[str, dict[str, Any]] = {
     "bitstar": {**COLUMNS, "planner": "bitstar", "world_seed": 5},
     "explore": {**ROOMS, "mission": "explore", "world.size_m": [6.0, 4.5, 2.6], "mission.time_base_s": 20.0},
     "frontier_3d": {
-        "world": "multilevel", "trigger": "mcr", "safety": "committed", "controller": "flatness",
-        "mapping": "dense_thin", "explorer": "frontier_3d", "world.storeys": 2,
+        "world": "multilevel", "strategy": "safe_3d", "world.storeys": 2,
         "world.size_m": [7.0, 6.06, 4.3], "world.racks": 1,
     },
     "inspect": {
