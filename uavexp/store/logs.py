@@ -40,7 +40,7 @@ _DAMAGE = (
     SyntaxError, zipfile.BadZipFile, zlib.error, struct.error,
 )  # fmt: skip  # what unpacking a bad file raises
 # added since: left out while empty, so that digests without them stay
-_LATER = ("track_swerve_m", "seen_so_far")
+LATER = ("track_swerve_m", "seen_so_far")
 _RAGGED = ("changed_m", "trajectory_m")  # (n, 3) per replan, n differing
 
 
@@ -50,7 +50,7 @@ def log_arrays(log: TrialLog) -> Arrays:
     for name, value in flat(log).items():
         if name in EVENTS:
             arrays |= _event_arrays(name, EVENTS[name], value)
-        elif name not in _LATER or value.size:
+        elif name not in LATER or value.size:
             arrays[name] = np.asarray(str(value) if isinstance(value, str) else value)
     return arrays
 
