@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import errno
 import os
 import resource
@@ -9,8 +10,9 @@ import signal
 import sys
 from collections.abc import Callable
 from types import FrameType
+from typing import NoReturn
 
-from uavexp.errors import UavexpError, one_line
+from uavexp.errors import ConfigError, UavexpError, one_line
 
 _FILES, _FEWEST_FILES = 4096, 64  # open at a time
 _REFUSALS = (
@@ -19,6 +21,14 @@ _REFUSALS = (
 )  # fmt: skip
 # SIGTERM, and SIGHUP of a terminal that closes, would lose the table of what has flown
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+class Parser(argparse.ArgumentParser):
+    """Takes a command line apart; a wrong one is bad input like any other."""
+
+    def error(self, message: str) -> NoReturn:
+        """Refuse what was typed."""
+        raise ConfigError(f"{message}; see --help")
 
 
 def exit_code_of(command: Callable[[], int]) -> int:

@@ -5,10 +5,8 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from typing import NoReturn
 
-from uavexp.errors import ConfigError
-from uavexp.interrupts import exit_code_of
+from uavexp.interrupts import Parser, exit_code_of
 
 _ABOUT = """Which promises of its group an option keeps: python -m uavexp.check planner=mine --config-dir DIR
 
@@ -17,18 +15,13 @@ The exit code is 0 when every promise is kept, 1 when one is broken, 2 for bad i
 """
 
 
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        raise ConfigError(f"{message}; see --help")
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Check the options that are named and return the exit code."""
     return exit_code_of(lambda: _check(_parse(sys.argv[1:] if arguments is None else arguments)))
 
 
 def _parse(arguments: Sequence[str]) -> argparse.Namespace:
-    parser = _Parser(
+    parser = Parser(
         prog="python -m uavexp.check",
         description=_ABOUT,
         formatter_class=argparse.RawDescriptionHelpFormatter,

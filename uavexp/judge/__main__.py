@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 import os
@@ -10,19 +9,13 @@ import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
 
 from uavexp.errors import ConfigError
-from uavexp.interrupts import exit_code_of, leave_at_once
+from uavexp.interrupts import Parser, exit_code_of, leave_at_once
 from uavexp.judge.facts import as_json, lines_of, values_of
 from uavexp.judge.flight import Judged, Pose, judged
 from uavexp.judge.readers import READERS, read
 from uavexp.store.records import write_bytes
-
-
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        raise ConfigError(f"{message}; see --help")
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -70,8 +63,8 @@ def _picture(found: Judged, values: dict[str, float], name: str, typed: Sequence
     return picture.getvalue()
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(
+def _parser() -> Parser:
+    parser = Parser(
         prog="python -m uavexp.judge",
         description="Judges a recorded flight by the metrics of every flight; nothing is flown.",
         epilog="files: " + ", ".join(READERS) + ", or the folder of a ROS 2 bag",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import csv
 import io
 import math
@@ -11,24 +10,18 @@ import sys
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
 
 from uavexp.config.composition import CELL_AXIS, Composer
 from uavexp.config.options import user_folder
 from uavexp.config.overrides import parse_settings
 from uavexp.errors import ConfigError, RecordError
-from uavexp.interrupts import exit_code_of, leave_at_once
+from uavexp.interrupts import Parser, exit_code_of, leave_at_once
 from uavexp.judge.readers import told
 from uavexp.replay.asked import Asked, asked
 from uavexp.replay.recorded import Reading, Recorded
 from uavexp.store.records import write_bytes
 
 _NO_PART = ("seed", "out", "experiments", "experiment", "world", "mission", "movers")
-
-
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        raise ConfigError(f"{message}; see --help")
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -139,8 +132,8 @@ def _picture(found: Sequence[Asked], title: str) -> bytes:
     return png_of(found, title)
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(
+def _parser() -> Parser:
+    parser = Parser(
         prog="python -m uavexp.replay",
         description="When each policy would have replanned along a recorded path; nothing is flown.",
     )
