@@ -133,13 +133,13 @@ def _lock_file(folder: Path) -> IO[str]:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             if (folder / LOCK).stat().st_ino == os.fstat(file.fileno()).st_ino:
                 return file
-        except BlockingIOError as error:
+        except BlockingIOError:
             file.seek(0)
             holder = file.read().strip() or "unknown"
             raise RecordError(
                 f"{folder}: another command (process {holder}) is flying into it; wait for its end, "
                 "or name another folder with out=DIR"
-            ) from error
+            ) from None
         except FileNotFoundError:  # removed between the opening and the locking
             pass
         except OSError as error:
