@@ -32,6 +32,7 @@ import numpy as np
 
 from uavexp.arrays import Bool, Float
 from uavexp.errors import require
+from uavexp.explorer.aside import lie_aside
 from uavexp.explorer.planar import (
     ascend,
     cluster_centroids,
@@ -283,11 +284,7 @@ class Frontier:
 
     def _aside_of(self, points_m: Float) -> Bool:
         """Which points (N, 3) lie near a goal set aside."""
-        if not self._aside:
-            return np.zeros(len(points_m), dtype=np.bool_)
-        others = np.array([position_m for _, position_m in self._aside])
-        away_m = np.linalg.norm(points_m[:, None] - others, axis=2)
-        return np.asarray((away_m < self.aside_radius_m).any(axis=1))
+        return lie_aside(points_m, self._aside, self.aside_radius_m)
 
 
 def _most(spare: float, weight: float) -> float:

@@ -29,6 +29,7 @@ import numpy as np
 
 from uavexp.arrays import Bool, Float, Int
 from uavexp.errors import require
+from uavexp.explorer.aside import lie_aside
 from uavexp.explorer.volume.cells import Body, Cells
 from uavexp.explorer.volume.route import ANY, NARROWER, WIDE, Ways, optimistic
 from uavexp.explorer.volume.space import Candidates, Space, leg_is_done
@@ -309,8 +310,4 @@ class Frontier3d:
 
     def _aside_of(self, points_m: Float) -> Bool:
         """Which points (N, 3) lie near a place set aside."""
-        if not self._aside:
-            return np.zeros(len(points_m), dtype=np.bool_)
-        others = np.array([position_m for _, position_m in self._aside])
-        away_m = np.linalg.norm(points_m[:, None] - others, axis=2)
-        return np.asarray((away_m < self.aside_radius_m).any(axis=1))
+        return lie_aside(points_m, self._aside, self.aside_radius_m)
