@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import fcntl
 import os
@@ -10,14 +11,19 @@ import shutil
 import subprocess
 import sys
 import time
+from multiprocessing import forkserver
 from pathlib import Path
 
 import pytest
 
+from tests.jobs import act
 from tests.sweeps import QUICK, begin, records, variables
 from uavexp.__main__ import main
 from uavexp.store.records import read_record
 from uavexp.store.study import trial_folders
+from uavexp.sweep.fork_server import RefusedError, kill_fork_server, start_fork_server
+from uavexp.sweep.job import Allowance, Job
+from uavexp.sweep.local import run_local
 
 STUDY = (*QUICK, "strategy=mcr,tbr", "seed=0:20")
 
@@ -42,6 +48,26 @@ def test_too_few_open_files(files: int, words: str, tmp_path: Path) -> None:
     assert (done.returncode, done.stderr.count("\n")) == (1, 1), done.stderr
     assert words in done.stderr
     assert not (tmp_path / "out").exists()
+
+
+def test_a_fork_server_out_of_files_is_a_refusal() -> None:
+    """Children that it had started were told as trials that ended with exit code 255, worlds as bad input."""
+    start_fork_server(["tests.jobs"])
+    server = forkserver._forkserver._forkserver_pid  # type: ignore[attr-defined]
+    given = [Job(name=deed, label=deed, payload=(deed, 1.0)) for deed in ("sleep", "raise", "nothing")]
+    limits = Allowance(timeout_s=60.0, memory_mb=1000.0)
+    done = run_local(act, given, n_jobs=2, limits=limits, watch=lambda *told: limit_files(server))
+    try:
+        with pytest.raises(RefusedError, match="no process can be started for a trial"):
+            list(done)
+    finally:
+        kill_fork_server()
+
+
+def limit_files(process: int) -> None:
+    """Let a process open no file beyond those that it has."""
+    with contextlib.suppress(ProcessLookupError):
+        resource.prlimit(process, resource.RLIMIT_NOFILE, (1, 1))
 
 
 @pytest.mark.skipif(os.geteuid() != 0 or not shutil.which("setpriv"), reason="becomes another user")

@@ -7,17 +7,22 @@ command removes what a killed one has left.
 from __future__ import annotations
 
 import contextlib
+import errno
 import multiprocessing
 import os
 import re
 import shutil
 import signal
 import tempfile
+import time
 from collections.abc import Iterator, Sequence
 from multiprocessing import forkserver, process, resource_tracker, util
 from pathlib import Path
 
 from uavexp.errors import UavexpError
+from uavexp.sweep.child import REFUSED
+
+LOST = 255  # exit code that multiprocessing gives a child whose fork server has ended
 
 _TETHER = "uavexp.sweep.tether"
 _FOLDER = "uavexp-{}-"  # of the process of that number
@@ -54,6 +59,29 @@ def kill_fork_server() -> None:
         with contextlib.suppress(ProcessLookupError, ChildProcessError):
             os.kill(pid, signal.SIGKILL)
             os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)  # dead, for multiprocessing to find
+
+
+def raise_if_refused(patience_s: float = 0.0) -> None:
+    """Tell what became of a fork server that has ended because the system refused it a file or a process.
+
+    Args:
+        patience_s: how long to wait for its end: its files are closed a moment before.
+
+    Raises:
+        RefusedError: that was its end.
+    """
+    end_s = time.monotonic() + patience_s
+    pid = forkserver._forkserver._forkserver_pid  # type: ignore[attr-defined]
+    ended = None
+    with contextlib.suppress(ChildProcessError):
+        while pid is not None:
+            ended = os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT | os.WNOHANG)
+            if ended or time.monotonic() >= end_s:
+                break
+            time.sleep(0.01)
+    if ended and ended.si_code == os.CLD_EXITED and ended.si_status == REFUSED:
+        with refusals_told():
+            raise OSError(errno.EAGAIN, os.strerror(errno.EAGAIN))
 
 
 class RefusedError(UavexpError):

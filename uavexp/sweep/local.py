@@ -29,7 +29,14 @@ from typing import IO, Any
 from uavexp.store.records import Status
 from uavexp.sweep.child import REFUSED, run_child
 from uavexp.sweep.faults import death
-from uavexp.sweep.fork_server import RefusedError, ensure_fork_server, kill_fork_server, refusals_told
+from uavexp.sweep.fork_server import (
+    LOST,
+    RefusedError,
+    ensure_fork_server,
+    kill_fork_server,
+    raise_if_refused,
+    refusals_told,
+)
 from uavexp.sweep.job import Allowance, Answer, Call, Done, Job
 
 Watch = Callable[[Job, float, str], None]  # job, simulated time s, a few words
@@ -164,6 +171,7 @@ class _Supervisor:
         try:
             return self._start_once()
         except RefusedError:
+            raise_if_refused(patience_s=1.0)
             kill_fork_server()
             return self._start_once()
 
@@ -175,6 +183,7 @@ class _Supervisor:
             with theirs:
                 arguments = (theirs, self.call, self.limits.memory_mb)
                 process = context.Process(target=run_child, args=arguments, daemon=True)
+                raise_if_refused()
                 ensure_fork_server()
                 process.start()
         return _Child(process=process, connection=ours, printed=printed)
@@ -194,6 +203,8 @@ class _Supervisor:
             if answer is None and exit_code == REFUSED:
                 with refusals_told():
                     raise OSError(errno.EAGAIN, os.strerror(errno.EAGAIN))
+            if answer is None and exit_code == LOST:
+                raise_if_refused(patience_s=1.0)
             return answer or (self._hung if late else death(exit_code, _tail(child.printed)))
 
     @contextlib.contextmanager

@@ -3,8 +3,9 @@
 import os
 import sys
 import time
+from types import TracebackType
 
-from uavexp.sweep.child import die_with_parent
+from uavexp.sweep.child import REFUSED, die_with_parent
 
 _TRIES, _PAUSE_S = 20, 0.1
 _fork = os.fork
@@ -20,6 +21,11 @@ def _fork_patiently() -> int:
     return _fork()
 
 
+def _end(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+    """End without a word, which is the supervisor's: by this exit code it knows what to say."""
+    os._exit(REFUSED if isinstance(error, OSError) else 1)
+
+
 die_with_parent()
 os.fork = _fork_patiently
-sys.excepthook = lambda *error: None  # the supervisor hears of its end, and tells it in one line
+sys.excepthook = _end
