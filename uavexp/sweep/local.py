@@ -43,6 +43,7 @@ Watch = Callable[[Job, float, str], None]  # job, simulated time s, a few words
 
 _PARTING_S = 5.0  # a child that has answered may take so long to end
 _DUMP_BYTES = 20_000
+_OWN_REFUSALS = (errno.EMFILE, errno.ENFILE, errno.EAGAIN, errno.ENOMEM)  # of this process, not of the server
 
 
 def run_local(
@@ -170,7 +171,9 @@ class _Supervisor:
         """A new child; once more with a new fork server, if the one that there is has died."""
         try:
             return self._start_once()
-        except RefusedError:
+        except RefusedError as refusal:
+            if getattr(refusal.__cause__, "errno", None) in _OWN_REFUSALS:
+                raise  # the server is well, and others' children hang on it
             raise_if_refused(patience_s=1.0)
             kill_fork_server()
             return self._start_once()
