@@ -12,7 +12,7 @@ SUPPORTED := import sys; (3, 11) <= sys.version_info < (3, 14) or sys.exit(1); p
 PYTHON ?= $(shell for name in $(PYTHONS); do $$name -c '$(SUPPORTED)' 2>/dev/null && break; done)
 UV ?= $(shell uv --version >/dev/null 2>&1 && echo uv)
 
-.PHONY: run test check docs pages bench golden conf lock clean
+.PHONY: run test check docs pages results bench golden conf lock clean
 .DELETE_ON_ERROR:
 
 run: $(STAMP)
@@ -36,6 +36,11 @@ docs: $(STAMP)
 # Tables and numbers of README and site, from the committed results
 pages: $(STAMP)
 	@$(BIN)/python docs/pages.py
+
+# Every study of experiments/results.yaml flown anew (hours), its results put in place and compared with those
+# before; a tenth, nothing put in place: make results FAST=1. What it would fly: make results DRY=1
+results: $(STAMP)
+	@$(BIN)/python -m uavexp.results $(foreach word,FAST DRY ONLY,$(if $($(word)),$(word)=$($(word))))
 
 bench: $(STAMP)
 	@$(BIN)/python -m benchmarks

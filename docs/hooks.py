@@ -18,7 +18,16 @@ from uavexp.cli.helptext import described, groups_of
 from uavexp.config.options import Option
 
 ROOT = Path(__file__).parents[1]
-PAPERS = {"mcr": "Paper 1", "voxel": "Paper 2", "inspect": "Paper 3", "dfbit": "Paper 4", "barn": "BARN"}
+PAPERS = {
+    "mcr": "Paper 1",
+    "voxel": "Paper 2",
+    "inspect": "Paper 3",
+    "dfbit": "Paper 4",
+    "barn": "BARN",
+    "safe": "Safe flights",
+    "real": "Real buildings",
+    "tune": "Tuning",
+}
 SHIPPED = {
     "CONTRIBUTING.md": "contributing.md",
     "CHANGELOG.md": "changelog.md",
@@ -64,8 +73,8 @@ def _studies() -> Iterator[tuple[str, list[Path]]]:
 
 
 def _shown() -> Iterator[Path]:
-    """Pictures, pages and texts of the results."""
-    for pattern in ("*.md", "pictures/*.png", "*/figures/*.png", "*/report.html"):
+    """Pictures and texts of the results."""
+    for pattern in ("*.md", "pictures/*.png", "*/figures/*.png"):
         for path in sorted(ROOT.glob(f"experiments/*/results/{pattern}")):
             if path.name != "README.md":
                 yield path
@@ -98,8 +107,6 @@ def _study_page(folder: Path) -> str:
     """Command, verdicts, tables and figures of a study, in the order in which its report has them."""
     study: dict[str, Any] = json.loads((folder / "study.json").read_text(encoding="utf-8"))
     lines = [f"# {study['title'] or folder.name}", "", f"`python -m uavexp experiments={study['name']}`", ""]
-    if (folder / "report.html").exists():
-        lines += ["[The report as one page](report.html)", ""]
     claims = [folder / "claims.md"] if (folder / "claims.md").exists() else []
     for file in [*claims, *_in_order(folder / "tables", "*.md", study["report"].get("tables", []))]:
         lines += [re.sub(r"(?m)^### ", "## ", file.read_text(encoding="utf-8")), ""]

@@ -30,6 +30,7 @@ LAYERS = (
     {"sweep"},
     {"cli"},
     {"tune"},
+    {"results", "benchmark"},
     {"__main__"},
 )
 HYDRA = ("hydra", "omegaconf")

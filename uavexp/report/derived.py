@@ -33,7 +33,7 @@ METRICS = (WASTED, USEFUL_SHARE, FALSE_TRIGGERS)
 def with_derived(study: Study, metrics: Sequence[Metric]) -> pd.DataFrame:
     """The trials with the columns that can be derived for these metrics."""
     trials = with_replan_shares(study.measurements)
-    if FALSE_TRIGGERS in metrics:
+    if FALSE_TRIGGERS in metrics and FALSE_TRIGGERS.column not in trials:  # committed rows have it
         return with_false_triggers(trials, study.replans)
     return trials
 

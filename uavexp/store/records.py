@@ -28,7 +28,16 @@ from uavexp.store.files import json_of
 
 SCHEMA = 2
 RECORD, WALL, LOG, PICTURE = "record.json", "wall.json", "log.npz", "picture.png"
-_ASKING = ("cli", "sweep", "report", "export", "show")  # they ask for flights, run them and show them
+_ASKING = (
+    "cli",
+    "sweep",
+    "tune",
+    "report",
+    "results",
+    "benchmark",
+    "export",
+    "show",
+)  # they ask for flights, run and show them
 
 
 class Status(StrEnum):

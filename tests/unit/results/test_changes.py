@@ -1,0 +1,57 @@
+"""A study flown anew against the committed one: what changed, and whether by more than chance."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from uavexp.paths import experiments_folder
+from uavexp.results.changes import changes, verdict_changes
+
+COMMITTED = experiments_folder() / "mcr" / "results" / "table1"
+ARM, OTHER = "TBR", "MCR"
+
+
+def altered(folder: Path, **columns: object) -> Path:
+    """A copy of the study in which one arm has other numbers."""
+    shutil.copytree(COMMITTED, folder)
+    rows = pd.read_parquet(folder / "trials.parquet")
+    for name, change in columns.items():
+        rows.loc[rows["arm"] == ARM, name] = change(rows.loc[rows["arm"] == ARM, name])  # type: ignore[operator]
+    rows.to_parquet(folder / "trials.parquet")
+    return folder
+
+
+def test_the_same_flights_changed_nothing(tmp_path: Path) -> None:
+    found = changes(COMMITTED, altered(tmp_path / "now"))
+    assert len(found) > 50
+    assert all(change.before == change.now or np.isnan(change.before) for change in found)
+    assert not [change for change in found if change.p < 0.05]
+
+
+def test_a_change_is_found_where_it_is_with_its_size(tmp_path: Path) -> None:
+    found = changes(COMMITTED, altered(tmp_path / "now", path_length_m=lambda values: values + 3.0))
+    beyond = [change for change in found if change.p < 0.05]
+    assert {(change.arm, change.metric.column) for change in beyond} == {(ARM, "path_length_m")}
+    assert beyond[0].now - beyond[0].before == pytest.approx(3.0)
+    assert beyond[0].pairs == 200
+
+
+def test_other_seeds_are_compared_unpaired(tmp_path: Path) -> None:
+    now = altered(tmp_path / "now", seed=lambda values: values + 1000)
+    mine = [change for change in changes(COMMITTED, now) if change.arm == ARM]
+    assert {change.pairs for change in mine} == {0}
+    assert not [change for change in mine if change.p < 0.05]
+
+
+def test_another_verdict_is_told(tmp_path: Path) -> None:
+    now = altered(tmp_path / "now")
+    assert verdict_changes(COMMITTED, now) == []
+    text = (now / "claims.csv").read_text()
+    (now / "claims.csv").write_text(text.replace(",reproduced,", ",contradicted,", 1))
+    (line,) = verdict_changes(COMMITTED, now)
+    assert line.endswith("reproduced -> contradicted")

@@ -1,0 +1,1 @@
+"""Every committed study flown anew by one command: `make results`."""
