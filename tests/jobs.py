@@ -112,6 +112,16 @@ def _print(_: Any) -> None:
     os.write(2, b"noise\n")
 
 
+_PRINTED: list[str] = []
+
+
+def _print_once(_: Any) -> None:
+    """As a component would, in Python: a line, and one that does not end."""
+    if not _PRINTED:
+        _PRINTED.append("first line")
+        print("first line\nhalf a line", end="")
+
+
 DEEDS = {
     "nothing": lambda _: None,
     "sleep": time.sleep,
@@ -124,6 +134,7 @@ DEEDS = {
     "kill_supervisor": _kill_supervisor,
     "leave": _leave,
     "print": _print,
+    "print_once": _print_once,
     "hog_a_little": _hog_a_little,
     "note": _note,
     "grow": _grow,

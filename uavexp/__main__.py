@@ -38,6 +38,7 @@ def _parse(arguments: Sequence[str]) -> argparse.Namespace:
     parser.add_argument("overrides", nargs="*")
     parser.add_argument("-h", "--help", action="store_true")
     parser.add_argument("-m", "--multirun", action="store_true")
+    parser.add_argument("--debug", action="store_true")
     parser.add_argument("--cfg", choices=("job", "hydra", "all"))
     parser.add_argument("--info", action="store_true")
     parser.add_argument("--version", action="store_true")
@@ -83,7 +84,7 @@ def _run(typed: Sequence[str]) -> int:
         from uavexp.config.named import with_named
 
         settings = with_named(arguments.config_name, folder, settings)
-    if not arguments.cfg:
+    if not arguments.cfg and not arguments.debug:
         from uavexp.sweep.head_start import give_head_start
 
         give_head_start(settings)
@@ -101,7 +102,7 @@ def _run(typed: Sequence[str]) -> int:
     from uavexp.cli.terminal import Terminal
     from uavexp.sweep.run import execute
 
-    return execute(command, Terminal(), folder, typed)
+    return execute(command, Terminal(bar=not arguments.debug), folder, typed, here=arguments.debug)
 
 
 if __name__ == "__main__":

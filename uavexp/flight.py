@@ -12,6 +12,7 @@ from uavexp.config.build import GROUPS, TARGET, build, tree_of, with_own
 from uavexp.config.composition import Cell, Composer
 from uavexp.config.options import user_folder
 from uavexp.config.overrides import flatten, parse_settings, render
+from uavexp.config.trust import VARIABLE, called_names, trusted_packages
 from uavexp.errors import ConfigError
 from uavexp.log import TrialLog
 from uavexp.types import World
@@ -178,7 +179,10 @@ def check_world(cell: Cell, seed: int, keep: Keep) -> None:
 
 
 def repeat_command(cell: Cell, seed: int, user_folder: Path | None = None) -> str:
-    """The command line that repeats one trial, quoted for a shell."""
+    """The command line that repeats one trial, quoted for a shell, with the packages that it trusts."""
     typed = [f"{'+' * setting.add}{setting.key}={render(setting.values[0])}" for setting in cell.settings]
     folder = ["--config-dir", str(user_folder)] if user_folder else []
-    return shlex.join(["python", "-m", "uavexp", *folder, *typed, f"seed={seed}"])
+    called = [*called_names(cell.config), *(f"{module}.METRICS" for module in cell.metrics)]
+    trusted = [name for name in trusted_packages()[1:] if any(item.startswith(f"{name}.") for item in called)]
+    trust = [f"{VARIABLE}={shlex.quote(','.join(trusted))}"] if trusted else []
+    return " ".join([*trust, shlex.join(["python", "-m", "uavexp", *folder, *typed, f"seed={seed}"])])

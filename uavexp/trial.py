@@ -11,6 +11,7 @@ from typing import Annotated
 
 import numpy as np
 
+from uavexp.answers import ask
 from uavexp.controller.base import Controller
 from uavexp.detection.base import Detection
 from uavexp.errors import require
@@ -172,7 +173,7 @@ def fly(parts: Parts, world: World, seed: int, progress: Progress | None = None)
                 parts.mapping.integrate(scan)
         if maps:
             with watch.lap("esdf"):
-                update = parts.mapping.update(time_s)
+                update = ask(MapUpdate, parts.mapping.update, time_s)
         if maps or chooses:
             reference = pilot.reference(time_s, parts.step_s)
             see = partial(flight.observe, time_s, reference, update, tracks)

@@ -14,8 +14,8 @@ from uavexp.paths import PACKAGE
 # a module may import modules of lower layers; within a layer, freely where it says so
 LAYERS = (
     {"arrays", "errors", "interrupts", "kernel_cache", "memory"},
-    {"field", "space", "trajectory", "pace", "seeding", "paths", "geometry", "o3d"},
-    {"types", "scan", "log", "causes", "parameters", "map_change", "path_clearance"},
+    {"field", "space", "trajectory", "pace", "seeding", "paths", "frames", "geometry", "o3d"},
+    {"types", "scan", "log", "causes", "parameters", "map_change", "path_clearance", "answers"},
     {"braking", "triangle_grid", "bodies", "scene", "formats"},
     {"cloud"},
     {"roles", "metrics", "inspection"},

@@ -20,14 +20,13 @@ from uavexp.config.build import (
     TARGET,
     build_component,
     component_class,
-    protocol_members,
-    protocol_of,
     top_level,
 )
 from uavexp.config.composition import Composer
 from uavexp.config.generate import option_files
 from uavexp.config.options import PRESET_GROUP, RUNNER_GROUP, read_option
 from uavexp.config.overrides import Setting, parse_settings
+from uavexp.config.protocols import protocol_members, protocol_of
 from uavexp.parameters import MISSING, parameter_types
 from uavexp.paths import PACKAGE, conf_folder
 from uavexp.trial import Parts

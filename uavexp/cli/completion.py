@@ -9,7 +9,7 @@ from uavexp.config.options import EXPERIMENT_GROUP, list_options, read_option
 from uavexp.errors import ConfigError
 from uavexp.paths import conf_folder
 
-_FLAGS = ("--help", "--multirun", "--cfg", "--info", "--version", "--config-dir", "--config-name")
+_FLAGS = ("--help", "--multirun", "--cfg", "--debug", "--info", "--version", "--config-dir", "--config-name")
 _OWN = ("seed=", "out=", f"{EXPERIMENT_GROUP}=", "tune")
 _BASH = """\
 _uavexp() {

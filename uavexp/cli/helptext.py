@@ -40,6 +40,8 @@ flags
   -h, --help [GROUP]   this text, or one group's parameters
   -m, --multirun       accepted for Hydra's sake; grids are expanded without it too
   --cfg job|hydra|all  print the composed configuration and fly nothing
+  --debug              fly in this process: breakpoint() works, what a component raises is raised;
+                       python -m pdb -m uavexp ... --debug stops where it raised
   --info               print versions and folders and fly nothing
   --version            print the version
   --config-dir DIR     your own options, DIR/<group>/<option>.yaml; their classes must be in a package

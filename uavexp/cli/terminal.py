@@ -22,7 +22,8 @@ from rich.progress import (
 )
 
 from uavexp.cli.summary import cell_table, trial_table
-from uavexp.store.records import LOG, PICTURE, read_record
+from uavexp.config.own_code import own_frame
+from uavexp.store.records import LOG, PICTURE, RECORD, read_record
 from uavexp.store.study import TRIALS
 from uavexp.store.table import pooled_versions
 
@@ -42,9 +43,10 @@ _TABLE_WIDTH = 150
 class Terminal:
     """Writes to standard output; errors go elsewhere, as one line."""
 
-    def __init__(self, console: Console | None = None) -> None:
+    def __init__(self, console: Console | None = None, *, bar: bool = True) -> None:
         # folders and commands must survive a pipe unbroken
-        self._console = console or Console(highlight=False, markup=False, soft_wrap=True)
+        self._console = console or Console(highlight=False, markup=False, emoji=False, soft_wrap=True)
+        self._draws_bar = bar and self._console.is_terminal  # a debugger needs the line to itself
         self._bar: Progress | None = None
         self._lock = threading.Lock()  # flights report from several threads
         self._notes: set[str] = set()  # of the worlds, that were said
@@ -68,7 +70,7 @@ class Terminal:
         """Show progress over the trials that are left while the block runs."""
         self._total, self._begin_s = len(agenda.left), time.monotonic()
         self._announce(agenda, "flying")
-        if not self._console.is_terminal or not self._total:
+        if not self._draws_bar or not self._total:
             yield
             return
         columns = (
@@ -98,6 +100,11 @@ class Terminal:
                 self._bar.update(self._bar.task_ids[0], words=line)
             elif time.monotonic() - self._last_s > (_PLAIN_PERIOD_S if self._done else _PATIENCE_S):
                 self.say(self._standing() if self._done and self._total > _MOST_LINES else line)
+
+    def printed(self, text: str) -> None:
+        """Pass on what a component has printed."""
+        with self._lock:
+            self.say(text.rstrip("\n"))
 
     def finished(self, done: Done) -> None:
         """Note that one trial has ended."""
@@ -142,16 +149,16 @@ class Terminal:
         rows = [row for row in rows if row["trial"] in jobs]
         few = len(rows) <= _MAX_ROWS
         # as wide as it needs: a cut-off number is worse than a wrapped line
-        wide = Console(file=self._console.file, markup=False, width=_TABLE_WIDTH)
+        wide = Console(file=self._console.file, markup=False, emoji=False, width=_TABLE_WIDTH)
         wide.print((trial_table if few else cell_table)(rows, list(agenda.study.axes)))
         for row in rows if few else [row for row in rows if row["status"] != "ok"][:_MAX_FAILURES]:
             if row["reason"]:
                 ending = f"ended {row['outcome']}" if row["status"] == "ok" else str(row["status"])
                 self.say(f"{jobs[row['trial']].label} {ending}: {row['reason']}")
-            for frame in (
-                read_record(trials / row["trial"])["traceback"][-1:] if row["status"] == "raised" else []
-            ):
-                self.say(f"  in {frame}")
+            if row["status"] == "raised" and (frames := read_record(trials / row["trial"])["traceback"]):
+                self.say(f"  in {own_frame(frames)}")
+            if row["status"] != "ok":
+                self.say(f"record:  {trials / row['trial'] / RECORD}")
         for row in rows if few else []:
             self.say(f"repeat:  {jobs[row['trial']].payload.command}")
             if (picture := trials / row["trial"] / PICTURE).exists():

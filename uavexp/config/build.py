@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import importlib
-import inspect
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Protocol, get_args, get_origin, runtime_checkable
 
+from uavexp.config.own_code import imported, raised
+from uavexp.config.protocols import check_protocol
 from uavexp.config.trust import check_trust, is_trusted
 from uavexp.errors import ConfigError, UavexpError
 from uavexp.parameters import check_value, nearest, parameter_types, plain, required_parameters
@@ -79,7 +79,10 @@ def check_config(config: Mapping[str, Any], options: Mapping[str, str]) -> dict[
     for group in GROUPS:
         tree = config[group]
         if not isinstance(tree, Mapping) or TARGET not in tree:
-            raise ConfigError(f"{group}={options[group]}: the option has no {TARGET}")
+            words = f"{group}={options[group]}: the option has no {TARGET}"
+            keys = tree if isinstance(tree, Mapping) else ()
+            hint = next((f" (is {key} meant?)" for key in keys if nearest(str(key), [TARGET])), "")
+            raise ConfigError(f"{words}{hint}; its file begins {TARGET}: PACKAGE.MODULE.CLASS")
         checked[group] = _checked_tree(group, tree, group)
     build(checked)
     return checked
@@ -131,7 +134,9 @@ def build_component(group: str, tree: Mapping[str, Any], path: str = "") -> Any:
         raise _told(path, cls, error) from error
     except (TypeError, ValueError, ArithmeticError) as error:
         raise ConfigError(f"{path}: {cls.__name__} cannot be made: {error}") from error
-    _check_protocol(group, component, path)
+    except Exception as error:  # of a stranger's class, anything
+        raise ConfigError(f"{path}: {cls.__name__} cannot be made: {raised(error)}") from error
+    check_protocol(group, component, path)
     return component
 
 
@@ -146,7 +151,7 @@ def with_own(parts: Parts, own: Mapping[str, Any]) -> Parts:
             raise ConfigError(
                 f"{group}: {component.__name__} is a class; give an object, {component.__name__}()"
             )
-        _check_protocol(group, component, group)
+        check_protocol(group, component, group)
     parts = dataclasses.replace(parts, **own)
     if own:
         _check_needs(parts)
@@ -161,15 +166,6 @@ def tree_of(component: object) -> dict[str, Any]:
     return {TARGET: f"{cls.__module__}.{cls.__qualname__}", **plain(values)}
 
 
-def _check_protocol(group: str, component: object, path: str) -> None:
-    lacking = [name for name in protocol_members(group) if not _has(component, name)]
-    if lacking:
-        cls = type(component)
-        raise ConfigError(
-            f"{path}: {cls.__module__}.{cls.__name__} is no {group}, it lacks {', '.join(lacking)}"
-        )
-
-
 @functools.cache
 def nested_groups(cls: type) -> dict[str, str]:
     """Parameters that hold components (annotated P or dict[str, P]), and the group whose protocol P is."""
@@ -182,50 +178,27 @@ def nested_groups(cls: type) -> dict[str, str]:
     return found
 
 
-def _has(component: object, name: str) -> bool:
-    """Whether an attribute exists; properties are not called, they may need `reset` first."""
-    try:
-        inspect.getattr_static(component, name)
-    except AttributeError:
-        return False
-    return True
-
-
 def component_class(group: str, target: str, path: str = "") -> type:
     """Class that a `_target_` names: defined in a trusted package, a built-in one in its group's."""
     path = path or group
     module_name, _, name = target.rpartition(".")
+    asked = f"{path}.{TARGET}={target}"
     if target.startswith("uavexp.") and not module_name.startswith(f"uavexp.{group}."):
-        raise ConfigError(f"{path}.{TARGET}={target} is no option of {group}")
-    try:
-        module = importlib.import_module(module_name)
-    except ModuleNotFoundError as error:
-        raise ConfigError(f"{path}.{TARGET}={target}: {error}") from error
+        raise ConfigError(f"{asked} is no option of {group}; name a class of uavexp.{group} or of your own")
+    module = imported(module_name, asked)
     cls = getattr(module, name, None)
     # a class reached through a trusted module but made elsewhere (pathlib.Path) is a stranger's
     if not isinstance(cls, type) or not is_trusted(f"{cls.__module__}.{name}"):
-        raise ConfigError(f"{path}.{TARGET}={target}: {module_name} defines no class {name}")
+        known = [item.__name__ for item in vars(module).values() if _is_made_in(item, module_name)]
+        raise ConfigError(
+            f"{asked}: {module_name} defines no class {name}{nearest(name, known)}; "
+            f"it defines {', '.join(known) or 'none'}"
+        )
     return cls
 
 
-def protocol_members(group: str) -> list[str]:
-    """Names of the methods and attributes that a group's protocol asks for."""
-    protocol = protocol_of(group)
-    own = [name for name in vars(protocol) if not name.startswith("_")]
-    return sorted({*own, *vars(protocol).get("__annotations__", {})})
-
-
-def protocol_of(group: str) -> type:
-    """The first protocol of `uavexp/<group>/base.py`, its options'; others are of what these begin."""
-    base = importlib.import_module(f"uavexp.{group}.base")
-    protocols = [
-        item
-        for item in vars(base).values()
-        if isinstance(item, type)
-        and item.__module__ == base.__name__
-        and getattr(item, "_is_protocol", False)
-    ]
-    return protocols[0]
+def _is_made_in(item: object, module_name: str) -> bool:
+    return isinstance(item, type) and item.__module__ == module_name
 
 
 def _checked_tree(group: str, tree: Any, path: str) -> dict[str, Any]:

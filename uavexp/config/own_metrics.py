@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib import import_module
 from typing import Any
 
+from uavexp.config.own_code import imported
 from uavexp.config.trust import VARIABLE, is_trusted
 from uavexp.errors import ConfigError
 from uavexp.metrics.metric import Measure, Metric, Metrics
@@ -47,9 +47,7 @@ def _declared(module: str) -> Metrics:
     if not is_trusted(f"{module}.METRICS"):
         raise ConfigError(f"metrics={module} is refused: add its package to the variable {VARIABLE}")
     try:
-        metrics: Metrics = import_module(module).METRICS
-    except ImportError as error:
-        raise ConfigError(f"metrics={module} cannot be imported: {error}") from error
+        metrics: Metrics = imported(module, f"metrics={module}").METRICS
     except AttributeError as error:
         raise ConfigError(f"metrics={module} declares no METRICS, {{Metric(...): measure}}") from error
     return metrics

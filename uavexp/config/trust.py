@@ -70,6 +70,11 @@ def check_trust(tree: Any) -> None:
             )
 
 
+def called_names(tree: Any) -> list[str]:
+    """Dotted names of all that a checked tree calls."""
+    return [str(value) for _, value in _calls(tree, "")]
+
+
 def _calls(node: Any, path: str) -> Iterator[tuple[str, Any]]:
     if isinstance(node, Mapping):
         for key, value in node.items():

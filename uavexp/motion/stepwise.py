@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from uavexp.answers import ask
 from uavexp.motion.base import Craft, Ending, Judge
 from uavexp.movers.base import Reacting
 from uavexp.types import Command, Reference, State
@@ -30,7 +31,7 @@ class Stepwise:
             if reference is None or step > first:
                 reference = craft.pilot.reference(time_s, craft.step_s)
             if step % craft.command_steps == 0:
-                self._command = craft.controller.command(self.estimate, reference)
+                self._command = ask(Command, craft.controller.command, self.estimate, reference)
             craft.recorder.step(step, self.state, self.estimate, reference, scene.bodies)
             ending = judge(step, step + 1)
             if ending is not None:
@@ -41,7 +42,7 @@ class Stepwise:
     def _advance(self, time_s: float) -> None:
         """Fly the step that ends at a time."""
         craft = self.craft
-        moved = craft.vehicle.step(self._command, craft.step_s)
+        moved = ask(State, craft.vehicle.step, self._command, craft.step_s)
         if self._looked_at is not None:
             self._looked_at.notice(moved.position_m, moved.velocity_mps)
         craft.contact.scene.place(craft.movers.at(time_s))

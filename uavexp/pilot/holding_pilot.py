@@ -20,6 +20,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from uavexp import causes
+from uavexp.answers import ask
 from uavexp.arrays import Float
 from uavexp.braking import with_stop
 from uavexp.log import Replan
@@ -157,7 +158,7 @@ class HoldingPilot:
                 stops = bool(self.failure) and not self.flown.backs
                 self.flown = self.flown.repaced(observation, self.crew.guard, stops=stops)
         with self.crew.watch.lap("trigger"):
-            decision = self.crew.trigger.decide(observation)
+            decision = ask(Decision, self.crew.trigger.decide, observation)
         # After a failure the pilot tries again by itself, equally often under every policy.
         if behind is not None:
             asked = Decision(replan=True, cause=behind.name)
@@ -205,7 +206,7 @@ class HoldingPilot:
         self, observation: Observation, goal: Goal, squeeze: Squeeze | None
     ) -> tuple[PlanResult, Flown | None]:
         """The planner's answer, and what is to be flown of it: nothing where the safety refuses."""
-        result = self.crew.planner.plan(self._plan_request(observation, goal, squeeze))
+        result = ask(PlanResult, self.crew.planner.plan, self._plan_request(observation, goal, squeeze))
         self.crew.watch.add("search", result.wall_search_s)
         self.crew.watch.add("optimise", result.wall_optimise_s)
         plan = result.trajectory

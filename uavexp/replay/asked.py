@@ -14,6 +14,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from uavexp import causes
+from uavexp.answers import ask
 from uavexp.arrays import Float
 from uavexp.config.build import build
 from uavexp.config.composition import Cell
@@ -24,7 +25,7 @@ from uavexp.replay.recorded import Frame, Recorded
 from uavexp.scene import Scene
 from uavexp.trajectory import Trajectory, evaluate
 from uavexp.trial import Parts
-from uavexp.types import Goal, MapUpdate, Observation, Reference, State
+from uavexp.types import Decision, Goal, MapUpdate, Observation, Reference, State
 
 _MARGIN_M = 0.5  # of the map around the path, beyond the camera's range
 _TIME_S = 1e-5  # stamps since 1970 are no more exact
@@ -81,7 +82,7 @@ class _Policy:
             if seen.time_s >= self.settle_s - _TIME_S:
                 self._request(causes.FIRST.name, 0.0, seen)
             return
-        decision = self.parts.trigger.decide(seen)
+        decision = ask(Decision, self.parts.trigger.decide, seen)
         clearance_m = clearance_ahead_m(self.plan, seen.field, seen.time_s)
         least_m = float(clearance_m.min()) if len(clearance_m) else math.nan
         self.rows.append((seen.time_s, decision.score, least_m))

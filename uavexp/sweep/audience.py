@@ -27,6 +27,9 @@ class Audience(Protocol):
     def watch(self, job: Job, time_s: float, words: str) -> None:
         """Note the progress of one flight, or at NaN s a note of its world; called from several threads."""
 
+    def printed(self, text: str) -> None:
+        """Pass on whole lines that the components of a single trial have printed; from another thread."""
+
     def finished(self, done: Done) -> None:
         """Note that one trial has ended."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import faulthandler
 import gc
+import io
 import multiprocessing
 import os
 import pickle
@@ -97,6 +98,8 @@ def _redirect_output(descriptor: int) -> None:
     for stream in (1, 2):
         os.dup2(descriptor, stream)
     os.close(descriptor)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(line_buffering=True)  # a line printed is there, whatever comes after it
     faulthandler.enable(file=2, all_threads=False)
 
 

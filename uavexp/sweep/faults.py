@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import re
 import signal
-import traceback
-from pathlib import Path
 
 from uavexp.errors import UavexpError, one_line
-from uavexp.paths import PACKAGE
+from uavexp.frames import portable_file, portable_trace
 from uavexp.store.records import Status
 from uavexp.sweep.job import Answer
 
@@ -20,14 +18,6 @@ _MOST_FRAMES = 20
 def reason_of(error: BaseException) -> str:
     """Type and message of an error in one line."""
     return f"{type(error).__name__}: {one_line(error)}"
-
-
-def portable_trace(error: BaseException) -> tuple[str, ...]:
-    """Frames of an error by module file and line."""
-    frames = traceback.extract_tb(error.__traceback__)
-    return tuple(
-        f"{_module_file(frame.filename)}:{frame.lineno} {frame.name}: {frame.line}" for frame in frames
-    )
 
 
 def failure(error: BaseException) -> Answer:
@@ -50,7 +40,7 @@ def death(exit_code: int | None, dump: str) -> Answer:
     """
     status = Status.MEMORY if any(word in dump for word in _OUT_OF_MEMORY) else Status.KILLED
     frames = [
-        f"{_module_file(match['file'])}:{match['line']} {match['name']}" for match in _DUMPED.finditer(dump)
+        f"{portable_file(match['file'])}:{match['line']} {match['name']}" for match in _DUMPED.finditer(dump)
     ]
     return Answer(status=status, reason=_ending(exit_code), trace=tuple(frames[:_MOST_FRAMES]))
 
@@ -64,10 +54,3 @@ def _ending(exit_code: int | None) -> str:
         name = "unknown"
     hint = "; the system does so when its memory runs out" if -exit_code == signal.SIGKILL else ""
     return f"the process was killed by signal {-exit_code} ({name}){hint}"
-
-
-def _module_file(filename: str) -> str:
-    path = Path(filename)
-    if path.is_relative_to(PACKAGE):
-        return path.relative_to(PACKAGE.parent).as_posix()
-    return "/".join(path.parts[-2:])

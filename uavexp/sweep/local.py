@@ -40,9 +40,11 @@ from uavexp.sweep.fork_server import (
 from uavexp.sweep.job import Allowance, Answer, Call, Done, Job
 
 Watch = Callable[[Job, float, str], None]  # job, simulated time s, a few words
+Hear = Callable[[str], None]  # text
 
 _PARTING_S = 5.0  # a child that has answered may take so long to end
 _DUMP_BYTES = 20_000
+_MOST_BYTES = 1_000_000  # of what is printed, passed on at a time
 _OWN_REFUSALS = (errno.EMFILE, errno.ENFILE, errno.EAGAIN, errno.ENOMEM)  # of this process, not of the server
 
 
@@ -53,6 +55,7 @@ def run_local(
     n_jobs: int,
     limits: Allowance,
     watch: Watch | None = None,
+    hear: Hear | None = None,
 ) -> Generator[Done, None, None]:
     """Run jobs, so many at a time, and yield each when it has ended.
 
@@ -64,10 +67,11 @@ def run_local(
         n_jobs: children at a time, >= 1.
         limits: of each job.
         watch: told the progress of every job, from its supervising thread.
+        hear: told what the jobs print, whole lines at a time, from there, too.
     """
     from joblib import Parallel, delayed  # 0.2 s that the start of the fork server need not wait for
 
-    supervisor = _Supervisor(call=call, limits=limits, watch=watch)
+    supervisor = _Supervisor(call=call, limits=limits, watch=watch, hear=hear)
     pool = Parallel(n_jobs=n_jobs, backend="threading", return_as="generator_unordered", batch_size=1)
     with refusals_told(AttributeError):  # as which a pool that lacks a thread ends
         results = pool(delayed(supervisor.run)(job) for job in jobs)
@@ -82,18 +86,20 @@ def run_local(
             results.close()
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(slots=True, kw_only=True, eq=False)
 class _Child:
     """A process that waits for calls, or makes one."""
 
     process: ForkServerProcess
     connection: Connection
     printed: IO[bytes]  # what its present call has printed, a crash's frames among it
+    heard: int = 0  # bytes of that, which were passed on
 
     def begin(self, payload: Any) -> None:
         """Give it a call to make; what is not heard, because it died, is found out by who waits."""
         self.printed.seek(0)
         self.printed.truncate()
+        self.heard = 0
         with contextlib.suppress(OSError):
             self.connection.send(payload)
 
@@ -105,6 +111,7 @@ class _Supervisor:
     call: Call
     limits: Allowance
     watch: Watch | None
+    hear: Hear | None
     # multiprocessing's bookkeeping of children is not made for threads: two that poll one child
     # at the same time may both take its exit code, and one gets a wrong one
     _lock: threading.Lock = field(default_factory=threading.Lock)
@@ -197,6 +204,7 @@ class _Supervisor:
         with self._killed_in_time(child):
             child.begin(job.payload)
             answer, last = self._wait(job, child)
+            self._pass_on(child, whole_lines=False)
         late = time.monotonic() >= deadline_s
         if answer is not None and not last and not late:
             self._idle.append(child)
@@ -237,8 +245,19 @@ class _Supervisor:
                 case bytes(pickled), bool(last):
                     return pickle.loads(pickled), last
                 case time_s, words:
+                    self._pass_on(child)
                     if self.watch is not None:
                         self.watch(job, time_s, words)
+
+    def _pass_on(self, child: _Child, *, whole_lines: bool = True) -> None:
+        """Tell what a child has printed since it was last looked at."""
+        if self.hear is None:
+            return
+        new = os.pread(child.printed.fileno(), _MOST_BYTES, child.heard)
+        new = new[: new.rfind(b"\n") + 1] if whole_lines else new
+        child.heard += len(new)
+        if new:
+            self.hear(new.decode(errors="replace"))
 
     def _end(self, child: _Child, grace_s: float) -> int | None:
         """Let a child end, or end it; its exit code."""

@@ -6,7 +6,8 @@ import contextlib
 import errno
 import multiprocessing
 import signal
-from collections.abc import Generator, Sequence
+import time
+from collections.abc import Callable, Generator, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -25,16 +26,23 @@ from uavexp.sweep.child import die_with_parent
 from uavexp.sweep.dask import run_dask
 from uavexp.sweep.fork_server import start_fork_server
 from uavexp.sweep.head_start import PRELOAD
-from uavexp.sweep.job import Done, Job
-from uavexp.sweep.local import Watch, run_local
+from uavexp.sweep.job import Answer, Done, Job
+from uavexp.sweep.local import run_local
 from uavexp.sweep.runner import Backend, Runner, read_runner
 from uavexp.sweep.trial_job import TrialJob, WorldCheck, do_job, do_job_elsewhere, files_of, version
+
+Fly = Callable[[Sequence[Job]], Generator[Done, None, None]]
 
 _WARM_UP_S = 3.0  # simulated: by then every kernel of a flight has been called
 
 
 def execute(
-    command: CommandLine, audience: Audience, user_folder: Path | None = None, typed: Sequence[str] = ()
+    command: CommandLine,
+    audience: Audience,
+    user_folder: Path | None = None,
+    typed: Sequence[str] = (),
+    *,
+    here: bool = False,
 ) -> int:
     """Fly a command's trials and leave their folder.
 
@@ -43,6 +51,7 @@ def execute(
         audience: who is told.
         user_folder: of `--config-dir`.
         typed: the command line, for the folder's own record of it.
+        here: fly in this process, for a debugger; what a component raises is raised.
 
     Returns:
         Exit code: 0, or 1 when some trial did not run to its end.
@@ -51,6 +60,8 @@ def execute(
         UavexpError: bad input, told before anything was written; or a full disk.
     """
     runner = read_runner(command.runner)
+    if here and runner.backend is not Backend.LOCAL:
+        raise ConfigError("--debug flies in this process: leave runner=dask away")
     look = partial(agenda_of, command, user_folder=user_folder, accept_other_code=runner.accept_other_code)
     if runner.dry_run:
         folder = folder_of(command)
@@ -59,27 +70,28 @@ def execute(
     with opened(command) as folder:
         agenda = look(folder)
         if agenda.left:
-            _prepare(agenda, runner, audience)
-        return _fly_agenda(agenda, command, audience, Run(typed=typed, how=runner.how), runner)
+            _prepare(agenda, runner, audience, here=here)
+        fly = partial(_fly_here, audience) if here else partial(_fly, runner, audience)
+        return _fly_agenda(agenda, command, audience, Run(typed=typed, how=runner.how), fly)
 
 
-def _prepare(agenda: Agenda, runner: Runner, audience: Audience) -> None:
+def _prepare(agenda: Agenda, runner: Runner, audience: Audience, *, here: bool) -> None:
     """Have kernels compiled and the fork server started."""
     if not kernels.is_compiled():
         audience.say("first run: compiling kernels takes about a minute")
         _compile_kernels(agenda.left[0])
-    if runner.backend == Backend.LOCAL:
+    if runner.backend == Backend.LOCAL and not here:
         start_fork_server([PRELOAD])
 
 
-def _fly_agenda(agenda: Agenda, command: CommandLine, audience: Audience, run: Run, runner: Runner) -> int:
+def _fly_agenda(agenda: Agenda, command: CommandLine, audience: Audience, run: Run, fly: Fly) -> int:
     raise_from_now_on()
     folder, kept, failed = agenda.study.folder, 0, 0
     checks = _world_checks(agenda)
     unchecked, waiting = len(checks), list[Done]()
     with (
         audience.progress(agenda),
-        contextlib.closing(_fly(checks, agenda.left, runner, audience.watch)) as flying,
+        contextlib.closing(fly([*checks, *agenda.left])) as flying,
     ):
         try:
             for done in flying:
@@ -136,15 +148,13 @@ def _world_checks(agenda: Agenda) -> list[Job]:
     ]
 
 
-def _fly(
-    checks: Sequence[Job], left: Sequence[Job], runner: Runner, watch: Watch
-) -> Generator[Done, None, None]:
-    """Make the worlds and fly what is left, in other processes."""
-    workers = min(runner.workers, max(1, len(left)))
+def _fly(runner: Runner, audience: Audience, jobs: Sequence[Job]) -> Generator[Done, None, None]:
+    """Make the worlds and fly what is left, in other processes; what a single trial prints is passed on."""
+    workers = min(runner.workers, max(1, len(jobs)))
     if runner.backend == Backend.DASK:
         return run_dask(
             do_job_elsewhere,
-            [*checks, *left],
+            jobs,
             address=runner.address,
             queue=runner.queue,
             n_jobs=workers,
@@ -152,7 +162,17 @@ def _fly(
             preload=[PRELOAD],
             version=version,
         )
-    return run_local(do_job, [*checks, *left], n_jobs=workers, limits=runner.limits, watch=watch)
+    hear = audience.printed if len(jobs) == 1 else None
+    return run_local(do_job, jobs, n_jobs=workers, limits=runner.limits, watch=audience.watch, hear=hear)
+
+
+def _fly_here(audience: Audience, jobs: Sequence[Job]) -> Generator[Done, None, None]:
+    """Do jobs in this process, where a debugger can be; what one raises is raised."""
+    for job in jobs:
+        begin_s = time.monotonic()
+        value = do_job(job.payload, partial(audience.watch, job))
+        answer = Answer(status=Status.OK, value=value)
+        yield Done(job=job, answer=answer, wall_s=time.monotonic() - begin_s)
 
 
 def _refuse_bad_world(done: Done) -> None:
