@@ -27,6 +27,7 @@ PAPERS = {
     "safe": "Safe flights",
     "real": "Real buildings",
     "tune": "Tuning",
+    "benchmark": "Benchmark",
 }
 SHIPPED = {
     "CONTRIBUTING.md": "contributing.md",

@@ -29,6 +29,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         from uavexp.tune.__main__ import main as tune
 
         return tune(typed[1:])
+    if typed[:1] == ["benchmark"]:
+        from uavexp.benchmark.__main__ import main as benchmark
+
+        return benchmark(typed[1:])
     leave_at_once()
     return exit_code_of(lambda: _run(typed))
 

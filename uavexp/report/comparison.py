@@ -19,6 +19,7 @@ from uavexp.report.significance import Alternative
 from uavexp.report.statistics import Interval
 
 FEWEST_SCENES = 6  # with fewer, sign flips of scenes cannot give p < 0.05, nor the bootstrap 95 %
+MOST_FAILED = 0.5  # share of an arm's flights: with more failed, nothing is said of what needs arrival
 SCENE = "scene"
 
 
@@ -153,9 +154,15 @@ def arm_names(trials: pd.DataFrame, arm_axes: Sequence[str]) -> pd.Series:
 
 
 def estimate(panel: Panel, metric: Metric, arm: str) -> ArmEstimate:
-    """Mean of a metric over an arm's trials, with its spread and interval."""
+    """Mean of a metric over an arm's trials, with its spread and interval.
+
+    There is none of what needs arrival where fewer than half of the flights succeeded: it would be that of
+    flights cut short, or of a vehicle left behind.
+    """
     values = panel.values(metric, arm)
     exists = np.isfinite(values)
+    if metric.needs_arrival and panel.has(RATE) and panel.success(arm).sum() < MOST_FAILED * panel.n(arm):
+        exists[:] = False
     values, scene = values[exists], panel.scene[exists]
     if not values.size:
         return ArmEstimate(n=0, mean=math.nan, sd=math.nan, interval=statistics.NOTHING)

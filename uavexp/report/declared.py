@@ -10,7 +10,8 @@
 
 A table `by_metric` is made by the function `table` of `uavexp/report/tables/by_metric.py`, a figure
 `success` by `figure` of `uavexp/report/figures/success.py`; a dotted name is a module of a trusted
-package (`UAVEXP_TRUST`) with such a function. A claim names one of the `judges`. Every other key is an
+package (`UAVEXP_TRUST`) with such a function. A claim names one of the `judges`; claims that bear a
+`sentence` together have their p values corrected over all of them. Every other key is an
 argument of that function; `metrics` stand in `settings.metrics` where they are not given.
 """
 
@@ -41,7 +42,7 @@ _DEFAULTS: dict[str, list[Any]] = {TABLES: [{"by_arm": _SUMMARY}], FIGURES: ["su
 _FILE_NAME = re.compile(r"\w{1,100}")
 _WORDS = ("first", "second", "label", "printed")  # that a statement may name
 _SPEC = re.compile(r"(\.\d)?[fg%]?")
-_CLAIM_KEYS = ("says", "source", "judge", "among", "each")
+_CLAIM_KEYS = ("says", "source", "judge", "among", "each", "sentence")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,6 +71,7 @@ class Claim:
     among: Mapping[str, str]  # axis -> the one value looked at
     is_one_of_many: bool  # not told where its arms were not flown
     metrics: tuple[Metric, ...]
+    sentence: str = ""  # of those it bears with other claims: p values are corrected over all of them
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,6 +107,14 @@ def results_of(study: Study, asked: Declared) -> Results:
         shown=_all_metrics([*asked.tables, *asked.figures, *asked.claims]),
         compared=_all_metrics([*compared, *directions]),
         asked=tuple(dict.fromkeys((claim.arms[0], claim.arms[1]) for claim in directions)),
+        sentences=tuple(
+            tuple(
+                (claim.metrics[0], claim.arms[0], claim.arms[1])
+                for claim in directions
+                if claim.sentence == sentence
+            )
+            for sentence in dict.fromkeys(filter(None, (claim.sentence for claim in directions)))
+        ),
     )
 
 
@@ -182,6 +192,7 @@ def _claims(item: Any) -> Iterator[Claim]:
             among=item.get("among", {}),
             is_one_of_many="each" in item,
             metrics=metrics,
+            sentence=str(item.get("sentence", "")),
         )
 
 

@@ -31,12 +31,13 @@ from uavexp.report.statistics import Interval
 
 RULE = (
     "A claimed direction is reproduced when the difference has that sign and its p value (sign flips of "
-    "whole scenes, two-sided, Holm-corrected over the comparisons of one metric) is below 0.05, contradicted "
-    "when it has the other sign and such a p value, else not shown; not testable without the trials or with "
-    "so few scenes that no p value could be below 0.05. A printed number is reproduced when the whole 95 % "
-    "interval lies within the claim's margin of it, contradicted when none of it does, else not shown: few "
-    "flights show nothing. Lengths, times, tracking and smoothness are judged where both arms succeeded: a "
-    "path cut short by failure is not a shorter path."
+    "whole scenes, two-sided, Holm-corrected over the comparisons of one metric, or over all claims that "
+    "bear a sentence with it) is below 0.05, contradicted when it has the other sign and such a p value, "
+    "else not shown; not testable without the trials or with so few scenes that no p value could be below "
+    "0.05. A printed number is reproduced when the whole 95 % interval lies within the claim's margin of "
+    "it, contradicted when none of it does, else not shown: few flights show nothing. Lengths, times, "
+    "tracking and smoothness are judged where both arms succeeded: a path cut short by failure is not a "
+    "shorter path."
 )
 
 
@@ -59,7 +60,9 @@ def better(results: Results, *, arms: Sequence[str], metric: Metric) -> Ruling:
     for test in tests or paired_tests(results.panel, [metric], [(first, second)]):
         same = (test.metric, test.first, test.second) == (metric, first, second)
         if same and test.both_succeeded == metric.needs_arrival:
-            return _direction(test), _numbers(test)
+            p, claims = results.borne(test)
+            borne = f", Holm over the {claims} claims of its sentence" if claims else ""
+            return _direction(judged := replace(test, p=p)), _numbers(judged) + borne
     return Verdict.NOT_TESTABLE, "the trials do not have it"
 
 

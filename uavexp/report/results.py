@@ -16,9 +16,11 @@ from uavexp.report.derived import with_derived
 from uavexp.report.labels import with_own_causes
 from uavexp.report.paired import PairedTest, paired_tests
 from uavexp.report.printed import Reference, read_reference
+from uavexp.report.significance import holm
 from uavexp.store.study import Study
 from uavexp.store.table import pooled_versions
 
+Sentence = tuple[tuple[Metric, str, str], ...]  # metric, first and second arm of each comparison
 ARM = "arm of all axes"  # column of `Results.trials`; an axis may be called "arm"
 OK = "ok"  # status of a trial that ran to its end
 
@@ -30,7 +32,9 @@ INTERVALS = (
 )
 FAILED = (
     "n counts every trial. One that did not run to its end (killed, out of time or memory) is a failure in "
-    "the success rate and has no other metric; means over fewer trials name their n."
+    "the success rate and has no other metric; means over fewer trials name their n. Lengths, times, "
+    "tracking and smoothness of an arm of which fewer than half of the flights succeeded are dashes: they "
+    "would be those of flights cut short, or of a vehicle left behind."
 )
 
 
@@ -43,6 +47,7 @@ class Results:
     shown: tuple[Metric, ...] = ()  # resampled together, which is faster than one by one
     compared: tuple[Metric, ...] = ()  # in which arms are tested against each other
     asked: tuple[tuple[str, str], ...] = ()  # pairs of arms that claims are about
+    sentences: tuple[Sentence, ...] = ()  # comparisons that bear a sentence together
 
     def only(self, among: Mapping[str, str], *, but: str = "") -> Results:
         """The part in which each axis named, `but` one, has the one value; it names no arm any more."""
@@ -118,6 +123,23 @@ class Results:
     def tests(self) -> tuple[PairedTest, ...]:
         """Every comparison in every metric compared, corrected for their number."""
         return paired_tests(self.panel, self.compared, self.comparisons)
+
+    def borne(self, test: PairedTest) -> tuple[float, int]:
+        """P of a comparison, Holm-corrected over those that bear a sentence with it, and their number.
+
+        Where it bears none, as it is corrected over its metric, and 0.
+        """
+        mine = (test.metric, test.first, test.second)
+        family = next((sentence for sentence in self.sentences if mine in sentence), ())
+        p = {
+            (one.metric, one.first, one.second): one.found.p
+            for one in self.tests
+            if one.both_succeeded == one.metric.needs_arrival
+        }
+        there = [one for one in family if one in p]
+        if mine not in there:
+            return test.p, 0
+        return float(holm(np.array([p[one] for one in there]))[there.index(mine)]), len(there)
 
     def occurring(self, metrics: Sequence[Metric]) -> list[Metric]:
         """The metrics that the trials have, without causes of replanning that never occurred.

@@ -92,7 +92,7 @@ def _fly(one: Listed, folder: Path) -> bool:
     _say(f"\n{one.study}")
     began_s = time.monotonic()
     command = [sys.executable, "-m", "uavexp", *one.words, f"out={folder}"]
-    ended = subprocess.run(command, check=False).returncode
+    ended = subprocess.run(command, cwd=checkout_root(), check=False).returncode
     if ended < 0 or ended == 130:
         raise KeyboardInterrupt
     _say(f"{one.study}: {_clock(time.monotonic() - began_s)}, said to take {_clock(one.estimate_s)}")

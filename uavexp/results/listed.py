@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import yaml  # type: ignore[import-untyped]
 
@@ -103,8 +104,8 @@ def _spread(entries: Sequence[str], share: float) -> list[str]:
 
 @cache
 def _trial_s(study: str) -> float:
-    """Clock time of a trial, s: the mean of the committed ones, else of those of all studies."""
+    """Clock time of a trial, s: the mean of the committed ones, else the median study's mean."""
     file = committed(study) / TABLE
     files = [file] if file.is_file() else sorted(experiments_folder().glob(f"*/results/*/{TABLE}"))
     times = [pd.read_parquet(file, columns=["wall_trial_s"])["wall_trial_s"].mean() for file in files]
-    return float(pd.Series(times).mean()) if times else math.nan
+    return float(np.median(times)) if times else math.nan

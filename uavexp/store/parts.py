@@ -167,11 +167,11 @@ def check_table(path: Path, table: pd.DataFrame, axes: Mapping[str, Any] | None)
         if table[column].isna().any():
             refuse(column, "is empty in places")
     for column in {*_NUMBER_COLUMNS} & {*table.columns}:
-        known = table[column].dropna()
+        known = table[column].dropna().infer_objects()  # truths that some trials lack are read as objects
         if len(known) and not (is_numeric_dtype(known) or is_bool_dtype(known)):
             refuse(column, "must hold numbers")
     for column in {*_TEXT_COLUMNS, *(axes or ())} & {*table.columns}:
-        known = table[column].dropna()
+        known = table[column].dropna().infer_objects()  # truths that some trials lack are read as objects
         if len(known) and (known.dtype == "category" or not all(isinstance(text, str) for text in known)):
             refuse(column, "must hold text")
     for column in {*_FILE_COLUMNS} & {*table.columns}:

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+from uavexp.cli.arguments import without_config_dir
 from uavexp.cli.terminal import Terminal
 from uavexp.config.composition import CELL_AXIS, CommandLine, Composer
 from uavexp.config.experiment import Experiment
@@ -58,7 +59,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _tune(typed: Sequence[str]) -> int:
-    words, own_folder = _without_config_dir(typed)
+    words, own_folder = without_config_dir(typed, "tune")
     composer = Composer(user_folder=user_folder(own_folder) if own_folder is not None else None)
     task = task_of(words, composer, ("tune", *typed))
     folder = folder_of(task.base)
@@ -69,20 +70,6 @@ def _tune(typed: Sequence[str]) -> int:
     page = make_report(folder)[-1]
     sys.stdout.write("\n".join([*summary(task, candidates), f"report:  {page}", str(folder)]) + "\n")
     return 0
-
-
-def _without_config_dir(typed: Sequence[str]) -> tuple[list[str], str | None]:
-    """The words that are no flags, and the folder of `--config-dir`."""
-    words, folder = list(typed), None
-    for flag in ("--config-dir", "-cd"):
-        if flag in words[:-1]:
-            place = words.index(flag)
-            folder = words[place + 1]
-            del words[place : place + 2]
-    for word in words:
-        if word.startswith("-"):
-            raise ConfigError(f"no such flag: {word}; see python -m uavexp tune --help")
-    return words, folder
 
 
 def task_of(words: Sequence[str], composer: Composer, typed: Sequence[str] = ()) -> Task:
