@@ -107,7 +107,8 @@ class Recovering:
         way_m = self._back_m(observation, room_m)
         if len(way_m) < 2:
             return here(observation), PlanResult(status=PlanStatus.NO_PATH, reason="no way back"), None
-        at = replace(observation.reference, position_m=observation.state.position_m)
+        state = observation.state
+        at = replace(observation.reference, position_m=state.position_m, velocity_mps=state.velocity_mps)
         observation = replace(observation, reference=at)  # it begins where the vehicle is
         plan = back_up(way_m, observation.time_s, self.rules.back_up_mps)
         goal = replace(here(observation), position_m=way_m[-1])

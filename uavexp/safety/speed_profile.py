@@ -109,7 +109,20 @@ def _wanted(way: Way, bound: Float, rest: int, effort: Effort) -> Float:
         if rest < count:
             x[n] = min(x[n], ((math.sqrt(gained**2 + stop[n] * speed**2) - gained) / speed) ** 2)
     x[rest:] = 0.0
+    kept = x.copy()
+    for n in range(min(rest, count) - 1):  # a plan that speeds up is begun at a rate that will do later
+        for later in range(n + 1, min(n + early, (n + min(rest, count)) // 2) + 1):
+            if way.speed_mps[later] > way.speed_mps[n]:
+                x[n] = min(x[n], kept[later])
     return x
+
+
+@nb.njit(cache=True)
+def _lasts_s(way: Way, n: int, x: float, jerk_mps3: float) -> float:
+    """How long the step after a sample takes, s: from standstill, as long as that jerk does for it."""
+    speed = max(way.speed_mps[n], _SLOW_MPS)
+    from_rest_s = (6.0 * way.step_s[n] * speed / jerk_mps3) ** (1.0 / 3.0)
+    return float(min(way.step_s[n] / math.sqrt(x + _SPARE), from_rest_s))
 
 
 @nb.njit(cache=True)
@@ -127,15 +140,19 @@ def fastest_rates(
     """
     wanted = _wanted(way, bound, rest, effort)
     needed = _backwards(way, np.ones(len(bound)), rest, effort.most_mps2)
-    u, early_s = rate[1], 0.0
+    along_mps2, early_s = rate[1] * way.speed_mps[0], 0.0  # what the change of rate gives
     x: Float = np.zeros(len(bound))
     x[0] = rate[0] ** 2
     kept = x[0] <= needed[0] + _SPARE
     for n in range(len(bound) - 1):
-        span = 2.0 * way.step_s[n]
-        turn = effort.jerk_mps3 / max(way.speed_mps[n], _SLOW_MPS) * way.step_s[n] / math.sqrt(x[n] + _SPARE)
-        faster = min(_steepest(way, n, x[n], effort.comfort_mps2, 1.0), u + turn)
-        slower = max(_steepest(way, n, x[n], effort.comfort_mps2, -1.0), u - turn)
+        span, speed = 2.0 * way.step_s[n], max(way.speed_mps[n], _SLOW_MPS)
+        turn = effort.jerk_mps3 * _lasts_s(way, n, x[n], effort.jerk_mps3)
+        left = max(math.sqrt(wanted[n + 1]) - math.sqrt(x[n]), 0.0)
+        gently = math.sqrt(2.0 * left * effort.jerk_mps3 / speed)  # the acceleration ends as the rate is there
+        faster = min(
+            _steepest(way, n, x[n], effort.comfort_mps2, 1.0), (along_mps2 + turn) / speed, gently
+        )
+        slower = max(_steepest(way, n, x[n], effort.comfort_mps2, -1.0), (along_mps2 - turn) / speed)
         hardest = _steepest(way, n, x[n], effort.most_mps2, -1.0)
         if wanted[n + 1] > 0.0 or x[n] * way.speed_mps[n] ** 2 > _CREEP_MPS**2:
             u = max(min((wanted[n + 1] - x[n]) / span, faster), slower)
@@ -146,4 +163,5 @@ def fastest_rates(
             early_s = way.step_s[n] + x[n] / (2.0 * u) if u < 0.0 else 0.0
             break
         x[n + 1] = x[n] + span * u
+        along_mps2 = u * way.speed_mps[n]
     return np.sqrt(x), early_s, kept
