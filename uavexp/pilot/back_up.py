@@ -13,6 +13,7 @@ _APART_M = 0.1  # places that are remembered
 _LEAST_M = 0.3  # a place nearer than this is here
 _SAME_M = 1e-3
 _GENTLE_MPS2 = 0.5
+_SMOOTHINGS = 8  # of the way: a spline through places as they were noted would turn sharply at each
 _WORSE_M = 0.02  # by which the clearance may fall on the way out of a narrow place
 
 
@@ -40,8 +41,11 @@ def back_up(back_m: Float, start_s: float, speed_mps: float) -> Trajectory:
     """Flight through places (N, 3) from rest to rest, from a time on, at about this speed.
 
     Each place has the time at which a steady acceleration, that speed and a steady deceleration bring the
-    vehicle there; a cubic spline leads through them.
+    vehicle there; a cubic spline leads through them, smoothed but for both ends.
     """
+    back_m = back_m.copy()
+    for _ in range(_SMOOTHINGS):
+        back_m[1:-1] = 0.25 * back_m[:-2] + 0.5 * back_m[1:-1] + 0.25 * back_m[2:]
     steps_m = np.linalg.norm(np.diff(back_m, axis=0), axis=1)
     keep = np.append(True, steps_m > _SAME_M)
     along_m = np.append(0.0, np.cumsum(steps_m))[keep]

@@ -148,10 +148,8 @@ def fastest_rates(
         span, speed = 2.0 * way.step_s[n], max(way.speed_mps[n], _SLOW_MPS)
         turn = effort.jerk_mps3 * _lasts_s(way, n, x[n], effort.jerk_mps3)
         left = max(math.sqrt(wanted[n + 1]) - math.sqrt(x[n]), 0.0)
-        gently = math.sqrt(2.0 * left * effort.jerk_mps3 / speed)  # the acceleration ends as the rate is there
-        faster = min(
-            _steepest(way, n, x[n], effort.comfort_mps2, 1.0), (along_mps2 + turn) / speed, gently
-        )
+        gently = math.sqrt(2.0 * left * effort.jerk_mps3 / speed)  # and ends as the rate is there
+        faster = min(_steepest(way, n, x[n], effort.comfort_mps2, 1.0), (along_mps2 + turn) / speed, gently)
         slower = max(_steepest(way, n, x[n], effort.comfort_mps2, -1.0), (along_mps2 - turn) / speed)
         hardest = _steepest(way, n, x[n], effort.most_mps2, -1.0)
         if wanted[n + 1] > 0.0 or x[n] * way.speed_mps[n] ** 2 > _CREEP_MPS**2:

@@ -111,3 +111,15 @@ def test_a_stop_off_the_reference_begins_with_the_acceleration_that_the_tilt_giv
     np.testing.assert_allclose(acceleration, [wanted, 0.0, 0.0], atol=1e-9)
     end = evaluate(flown.trajectory, np.array([flown.trajectory.end_s]))
     np.testing.assert_allclose(end[1][0], 0.0, atol=1e-9)
+
+
+def test_a_way_that_was_noted_with_jitter_is_flown_back_without_sharp_turns() -> None:
+    """2 cm aside at each place, 0.1 m apart, would ask for more than 1 m/s² at 0.5 m/s."""
+    way_m = np.column_stack([np.linspace(2.0, 0.0, 21), np.zeros(21), np.ones(21)])
+    way_m[1:-1, 1] += 0.02 * (-1.0) ** np.arange(19)
+    plan = back_up(way_m, 0.0, 0.5)
+    times_s = np.linspace(0.0, plan.end_s, 500)
+    at_m, _, acceleration = evaluate(plan, times_s)
+    np.testing.assert_allclose(at_m[[0, -1]], way_m[[0, -1]], atol=1e-9)
+    assert np.linalg.norm(acceleration, axis=1).max() < 0.8
+    assert np.abs(at_m[:, 1]).max() < 0.02
