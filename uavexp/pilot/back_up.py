@@ -13,7 +13,7 @@ _APART_M = 0.1  # places that are remembered
 _LEAST_M = 0.3  # a place nearer than this is here
 _SAME_M = 1e-3
 _GENTLE_MPS2 = 0.5
-_SMOOTHINGS = 8  # of the way: a spline through places as they were noted would turn sharply at each
+_SMOOTHINGS = 4  # of the way: a spline through places as they were noted would turn sharply at each
 _WORSE_M = 0.02  # by which the clearance may fall on the way out of a narrow place
 
 

@@ -24,13 +24,13 @@ all that is mapped as long as the assumptions hold.
 **Assumptions.** What was seen as free is free and stays so: the map is wrong by less than `margin_m`
 and what is kept by the planner beyond it (a plate thinner than half a voxel, seen edge-on, may be
 missing from `mapping=dense`; `dense_thin` has it), and nothing moves (movers are the planner's and the
-trigger's to avoid); the vehicle is on its reference but for an error below the same margin and what is left
-between the body and its turning circle: half of the time it is below 0.02 m, at most 0.05 to 0.13 m in flights at
-2.5 m/s and at 5 m/s (column `tracking_error_max_m`). It is counted, not proved: the pace falls to 0 as the error,
-or what the present difference of velocity makes of it, comes to the room beside the way, and to `stop_error_m`
-anywhere; and no pace turns the acceleration faster than the vehicle follows, but where the rest would be missed.
-The pose is right (drift is not seen). The start is free for `start_bubble_m` or as
-far as it is in truth, whichever is less; out of what was not seen around it the vehicle creeps, at
+trigger's to avoid); the vehicle is on its reference but for an error below the same margin and what is
+left between the body and its turning circle: half of the time it is below 0.02 m, at most 0.05 to 0.13 m
+in flights at 2.5 and 5 m/s (column `tracking_error_max_m`). It is counted, not proved: the pace falls to 0
+as the error, or what the present difference of velocity makes of it, comes to the room beside the way, and
+to `stop_error_m` anywhere; and no pace turns the acceleration faster than the vehicle follows, but where
+the rest would be missed. The pose is right (drift is not seen). The start is free
+for `start_bubble_m` or as far as it is in truth, whichever is less; out of what was not seen around it the vehicle creeps, at
 `creep_mps`, as long as the cell of its centre was seen. A vehicle that is pushed off, or that fell
 behind, stops in a straight line. With `person_mps` it is also slow enough everywhere to stop before somebody
 who steps out of a place that is hidden now; whoever is in sight is the planner's and the trigger's.
@@ -196,7 +196,7 @@ class _Commitment:
     def _verified(
         self, ahead: _Ahead, observation: Observation, squeeze: Squeeze | None
     ) -> tuple[Float, Bool, Float]:
-        """Mapped distance (N,) of each place ahead, whether it is verified, or left, and the speed it bounds."""
+        """Of each place ahead (N,): mapped distance, whether it is verified, or left, and the speed it bounds."""
         rules, field, radius_m = self.rules, observation.field, self.limits.body_radius_m
         half_height_m = 0.5 * self.limits.body_size_m[2]
         clearance_m, seen, centre = look_at(
@@ -238,7 +238,7 @@ class _Commitment:
     def _top_rate(self, ahead: _Ahead, clearance_m: Float, observation: Observation) -> Float:
         """Rates (N,): 1 for a vehicle that is near its reference, down to 0.
 
-        Where the body has less room than `stop_error_m` beside the way to come soon, an error counts for more.
+        Where the body has less room than `stop_error_m` beside the way soon to come, it falls sooner.
         """
         reference, state = observation.reference, observation.state
         lag_m = reference.position_m - state.position_m
