@@ -29,9 +29,9 @@ left between the body and its turning circle: half of the time it is below 0.02 
 in flights at 2.5 and 5 m/s (column `tracking_error_max_m`). It is counted, not proved: the pace falls to 0
 as the error, or what the present difference of velocity makes of it, comes to the room beside the way, and
 to `stop_error_m` anywhere; and no pace turns the acceleration faster than the vehicle follows, but where
-the rest would be missed. The pose is right (drift is not seen). The start is free
-for `start_bubble_m` or as far as it is in truth, whichever is less; out of what was not seen around it the vehicle creeps, at
-`creep_mps`, as long as the cell of its centre was seen. A vehicle that is pushed off, or that fell
+the rest would be missed. The pose is right (drift is not seen). The start is free for
+`start_bubble_m` or as far as it is in truth, whichever is less; out of what was not seen around it the
+vehicle creeps, at `creep_mps`, as long as the cell of its centre was seen. A vehicle that is pushed off, or that fell
 behind, stops in a straight line. With `person_mps` it is also slow enough everywhere to stop before somebody
 who steps out of a place that is hidden now; whoever is in sight is the planner's and the trigger's.
 
@@ -196,7 +196,7 @@ class _Commitment:
     def _verified(
         self, ahead: _Ahead, observation: Observation, squeeze: Squeeze | None
     ) -> tuple[Float, Bool, Float]:
-        """Of each place ahead (N,): mapped distance, whether it is verified, or left, and the speed it bounds."""
+        """Of each place (N,): mapped distance, whether it is verified, or left, and the speed it bounds."""
         rules, field, radius_m = self.rules, observation.field, self.limits.body_radius_m
         half_height_m = 0.5 * self.limits.body_size_m[2]
         clearance_m, seen, centre = look_at(
