@@ -31,8 +31,8 @@ as the error, or what the present difference of velocity makes of it, comes to t
 to `stop_error_m` anywhere; and no pace turns the acceleration faster than the vehicle follows, but where
 the rest would be missed. The pose is right (drift is not seen). The start is free for
 `start_bubble_m` or as far as it is in truth, whichever is less; out of what was not seen around it the
-vehicle creeps, at `creep_mps`, as long as the cell of its centre was seen. A vehicle that is pushed off, or that fell
-behind, stops in a straight line. With `person_mps` it is also slow enough everywhere to stop before somebody
+vehicle creeps, at `creep_mps`, as long as the cell of its centre was seen. A vehicle that is pushed
+off, or that fell behind, stops in a straight line. With `person_mps` it is also slow enough everywhere to stop before somebody
 who steps out of a place that is hidden now; whoever is in sight is the planner's and the trigger's.
 
 Source: Tordesillas, Lopez, Everett and How, FASTER, T-RO 2021; Ren et al., SUPER, Science Robotics 2025.
