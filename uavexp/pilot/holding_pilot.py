@@ -173,7 +173,7 @@ class HoldingPilot:
         if self._pending is not None:
             self.dropped_triggers += 1
             return
-        goal = self._select(observation, fresh=True)
+        goal = self._select(observation, fresh=True) if self.rules.fresh_goal else self.best_goal
         if squeeze is not None:
             goal = goal or target_of(observation)
         if goal is None and self.recovery.lost:

@@ -16,6 +16,10 @@ class Rules:
     restart_error_m: NonNegative = 0.4  # m, tracking error at which the vehicle has fallen behind: it stops,
     # and a plan starts at the measured state instead of the reference; 0: every plan does [ours]
     held_s: NonNegative = 0.6  # s, held by the safety on a plan until another one is asked for [ours]
+    fresh_goal: bool = (
+        True  # whether a request takes the best goal now, else the one that the explorer keeps,
+    )
+    # however stale: with a slow clock this decides between arriving and not [ours]
     goals_per_request: Count = 3  # so many goals are tried before the vehicle brakes [ours]
     recover_after_s: Positive = 2.0  # s without a plan that leads on, until looking around, backing up and
     # the rest are tried, one after the other [ours]

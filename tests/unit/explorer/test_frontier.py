@@ -12,6 +12,7 @@ from uavexp.arrays import Float
 from uavexp.check.fields import box, empty, field_from
 from uavexp.check.hall import LIMITS, hovering, observe
 from uavexp.explorer.frontier import Frontier
+from uavexp.explorer.view import straight
 from uavexp.field import FREE, UNKNOWN, DistanceField
 from uavexp.mapping.projection import Band, Projection
 from uavexp.parameters import Unknown
@@ -95,3 +96,37 @@ def test_no_candidate_is_better_than_the_goal(seed: int, unknown: Unknown, with_
             assert goal.score == pytest.approx(best, abs=1e-4)
             scored += 1
     assert scored > 0
+
+
+@pytest.mark.parametrize("bonus", [0.0, 1e6])
+def test_a_kept_goal_is_left_for_one_that_beats_it_by_the_bonus_and_for_no_other(bonus: float) -> None:
+    kept_where_another_was_better = 0
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        here, there = (
+            seen_at(rng, random_map(np.random.default_rng(seed), 5.0), x, False) for x in (1.0, 2.2)
+        )
+        there = replace(there, field=here.field)
+        explorer, anew = Frontier(hysteresis=bonus), Frontier()
+        for one in (explorer, anew):
+            one.reset(HEIGHT_M, LIMITS)
+        first, best = explorer.select(here, fresh=True), anew.select(there, fresh=True)
+        if first is None or best is None:
+            continue
+        if np.linalg.norm(first.position_m - there.state.position_m) < 1.5:
+            continue  # about to be visited
+        second = explorer.select(there)
+        if second is None or np.allclose(first.position_m, best.position_m):
+            continue
+        kept = np.allclose(second.position_m, first.position_m)
+        kept_where_another_was_better += kept
+        assert kept or bonus == 0.0
+        assert np.allclose(explorer.select(there, fresh=True).position_m, best.position_m)
+    assert bonus == 0.0 or kept_where_another_was_better > 2
+
+
+def test_the_straight_way_between_cells_goes_along_the_diagonal() -> None:
+    """Octile: 7 cells straight and 3 across, a diagonal step costs sqrt(2)."""
+    cells = np.array([[0, 0], [10, 3], [3, 10], [4, 4]])
+    expected = [7.0 + 3.0 * np.sqrt(2.0), 0.0, 7.0 * np.sqrt(2.0) + 0.0, 5.0 + np.sqrt(2.0)]
+    assert straight(cells, (10, 3)) == pytest.approx(expected, rel=4e-3)

@@ -23,7 +23,7 @@ from uavexp.trajectory import Trajectory, evaluate, hover_before
 from uavexp.trigger.mcr import Mcr
 from uavexp.trigger.ssp import Ssp
 from uavexp.trigger.tbr import Tbr
-from uavexp.types import Observation, PlanStatus, Reference, State
+from uavexp.types import Goal, Observation, PlanStatus, Reference, State
 
 START, TARGET = np.array([1.0, 2.0, 1.0]), np.array([9.0, 2.0, 1.0])
 BOUNDS = np.array([[0.0, 0.0, 0.0], [10.0, 4.0, 2.0]])
@@ -225,3 +225,21 @@ def test_a_vehicle_left_behind_stops_its_reference_and_plans_from_where_it_is(
     assert np.linalg.norm(np.array(next_m) - held_m, axis=1).max() < 0.01
     assert pilot.trajectory is not None
     np.testing.assert_allclose(evaluate(pilot.trajectory, np.array([0.0]))[0][0], held_m, atol=1e-9)
+
+
+class _Hesitant(TargetOnly):
+    """Keeps a goal off the target until a plan asks for the best one."""
+
+    def select(self, observation: Observation, *, fresh: bool = False) -> Goal | None:
+        place_m = TARGET if fresh else TARGET - np.array([3.0, 0.0, 0.0])
+        return Goal(position_m=place_m, is_target=fresh, score=0.0)
+
+
+@pytest.mark.parametrize("fresh_goal", [True, False])
+def test_a_request_takes_the_best_goal_or_the_kept_one_as_it_is_told(fresh_goal: bool) -> None:
+    pilot = make(Ssp())
+    pilot.rules = Holding(settle_s=0.0, fresh_goal=fresh_goal)
+    pilot.crew = replace(pilot.crew, explorer=_Hesitant())
+    pilot.explore(see(room(), 0.0, pilot.reference(0.0, 0.01)))
+    expected = TARGET if fresh_goal else TARGET - np.array([3.0, 0.0, 0.0])
+    assert np.allclose(pilot.replans[0].goal_m, expected)
