@@ -39,6 +39,21 @@ def test_it_is_refused_before_anything_is_made(typed: str) -> None:
     assert 0 < len(str(caught.value)) < 2000
 
 
+@pytest.mark.parametrize(
+    ("typed", "words"),
+    [
+        ("controller.drag_kgpm=1000", "at most 1.18 kg/m can be flown"),
+        ("controller=flatness controller.drag_kgpm=2", "at most 1.18 kg/m can be flown"),
+        ("vehicle=quadrotor vehicle.drag_coefficient=1e6", "at most 1.18 kg/m can be flown"),
+        ("controller.velocity_gain_per_s=1e4", "must be at most rate_hz = 100"),
+        ("planner=rrtstar planner.find=ompl_rrtstar planner.find.goal_bias=0", "must be 0.001 to 1"),
+    ],
+)
+def test_what_would_fly_as_nonsense_is_told_what_is_allowed(typed: str, words: str) -> None:
+    with pytest.raises(UavexpError, match=words):
+        Composer().command(parse_settings(typed.split()))
+
+
 def test_a_preset_that_includes_itself_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "strategy").mkdir()
     (tmp_path / "strategy" / "loop.yaml").write_text("# @package _global_\ndefaults: [/strategy: loop]\n")

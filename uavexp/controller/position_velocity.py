@@ -21,9 +21,12 @@ import numba as nb
 import numpy as np
 
 from uavexp.arrays import Float
+from uavexp.errors import require
 from uavexp.geometry import GRAVITY_MPS2, quaternion_from_rotation
 from uavexp.parameters import NonNegative, Positive, above, at_most, option
 from uavexp.types import Command, Limits, Reference, State
+from uavexp.vehicle.base import Vehicle
+from uavexp.vehicle.body import require_flyable_drag
 
 _LEAST_LIFT = 0.3  # share of gravity that is always lifted, so that body z stays up
 
@@ -123,6 +126,18 @@ class PositionVelocity:
     # the quadrotor's 0.0026 moves it by 2 mm [ours]
     _limits: Limits = field(init=False, repr=False)
     _mass_kg: float = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        for name in ("position_gain_per_s", "velocity_gain_per_s", "speed_gain_per_s"):
+            gain = getattr(self, name)
+            require(
+                gain <= self.rate_hz,
+                f"{name} = {gain:g} must be at most rate_hz = {self.rate_hz:g}, at which the loop is run",
+            )
+
+    def requires(self, *, vehicle: Vehicle, **_: object) -> None:
+        """Refuse to make up for a drag that the vehicle could not fly against."""
+        require_flyable_drag("drag_kgpm", self.drag_kgpm, vehicle.mass_kg, vehicle.limits.max_speed_mps)
 
     def reset(self, limits: Limits, mass_kg: float) -> None:
         """Begin a trial of a vehicle with these limits, of this mass."""

@@ -5,8 +5,30 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
+from uavexp.errors import require
+from uavexp.geometry import GRAVITY_MPS2
 from uavexp.parameters import between
 from uavexp.types import Limits
+
+
+def require_flyable_drag(name: str, drag_kgpm: float, mass_kg: float, max_speed_mps: float) -> None:
+    """Refuse a drag c |v| v that at full speed is more than the weight: nothing that hovers flies against it.
+
+    Args:
+        name: the parameter that it comes from.
+        drag_kgpm: c, kg/m.
+        mass_kg: of the vehicle.
+        max_speed_mps: of the vehicle.
+
+    Raises:
+        ConfigError: says what is allowed.
+    """
+    most_kgpm = mass_kg * GRAVITY_MPS2 / max_speed_mps**2
+    require(
+        drag_kgpm <= most_kgpm,
+        f"{name} is too large: a drag of {drag_kgpm:.4g} kg/m is more than the weight at max_speed_mps = "
+        f"{max_speed_mps:g}; at most {most_kgpm:.3g} kg/m can be flown",
+    )
 
 
 @dataclass(slots=True, kw_only=True)

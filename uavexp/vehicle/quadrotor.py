@@ -33,7 +33,7 @@ from uavexp.errors import require
 from uavexp.geometry import GRAVITY_MPS2
 from uavexp.parameters import NonNegative, Positive, between, option
 from uavexp.types import Command, State
-from uavexp.vehicle.body import Body
+from uavexp.vehicle.body import Body, require_flyable_drag
 
 # layout of the state vector of the kernels
 _P, _V, _Q, _W, _ROTOR, _SIZE = 0, 3, 6, 10, 13, 17
@@ -248,6 +248,8 @@ class Quadrotor(Body):
             f"rotor speeds must span the hover speed of {hover:.1f} rad/s, got min_rotor_speed_radps "
             f"{self.min_rotor_speed_radps} and max_rotor_speed_radps {self.max_rotor_speed_radps}",
         )
+        drag_kgpm = 0.5 * self.air_density_kgpm3 * self.drag_coefficient * self.frontal_area_m2
+        require_flyable_drag("drag_coefficient", drag_kgpm, self.mass_kg, self.max_speed_mps)
         self._plant = Plant(
             mass_kg=self.mass_kg,
             inertia_x_kgm2=self.inertia_x_kgm2,
@@ -256,7 +258,7 @@ class Quadrotor(Body):
             thrust_coefficient=self.thrust_coefficient_Ns2,
             torque_coefficient=self.torque_coefficient_Nms2,
             lever_m=0.5 * self.rotor_span_m / math.sqrt(2.0),
-            drag_kgpm=0.5 * self.air_density_kgpm3 * self.drag_coefficient * self.frontal_area_m2,
+            drag_kgpm=drag_kgpm,
             rotor_inertia_kgm2=self.rotor_inertia_kgm2,
             rotor_lag_s=self.rotor_lag_s,
             min_rotor_speed_radps=self.min_rotor_speed_radps,

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
-from uavexp.parameters import Count, Positive, Share, option
+from uavexp.parameters import Count, Positive, between, option
 from uavexp.planner.find.ompl import Ompl
 
 
@@ -16,7 +16,8 @@ class OmplRrtstar(Ompl):
 
     max_edge_m: Positive = 2.0  # m, longest edge; the paper's 0.5 finds a way through a building late and
     # improves it little
-    goal_bias: Share = 0.05  # 1, share of the samples that are the goal (OMPL's default)
+    goal_bias: Annotated[float, between(0.001, 1)] = 0.05  # 1, share of the samples that are the goal, which
+    # no other sample hits (OMPL's default)
     max_iterations: Count = 6_000  # samples; the paper names 3000
 
     def settings(self) -> dict[str, float]:
