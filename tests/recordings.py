@@ -6,6 +6,7 @@ import struct
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 RADIUS_M, SPEED_MPS, HEIGHT_M, CENTRE_M = 2.0, 1.0, 1.5, (5.0, 4.0)
 STEP_S, SAMPLES = 0.02, 501
@@ -23,7 +24,7 @@ def circle(step_s: float = STEP_S, samples: int = SAMPLES) -> tuple[np.ndarray, 
 
 def room_stl(file: Path) -> Path:
     """An empty room as a text STL."""
-    import trimesh
+    trimesh = pytest.importorskip("trimesh")
 
     box = trimesh.creation.box(bounds=[np.zeros(3), np.array(ROOM_M)])
     box.invert()  # its walls look inwards
@@ -67,6 +68,7 @@ def ros_bag(
     file: Path, kind: str, time_s: np.ndarray, position_m: np.ndarray, topics: tuple[str, ...] = ("/pose",)
 ):
     """A bag of PoseStamped: `bag` (ROS 1), `mcap` or `db3` (ROS 2, a folder)."""
+    pytest.importorskip("rosbags")
     from rosbags.rosbag1 import Writer as Writer1
     from rosbags.rosbag2 import StoragePlugin
     from rosbags.rosbag2 import Writer as Writer2
@@ -106,6 +108,7 @@ def depth_bag(
     file: Path, kind: str, encoding: str, images, camera: np.ndarray, places_m, step_s: float
 ) -> Path:
     """A bag of depth images in mm or m, their camera_info, and odometry of a vehicle that looks along x."""
+    pytest.importorskip("rosbags")
     from rosbags.rosbag1 import Writer as Writer1
     from rosbags.rosbag2 import StoragePlugin
     from rosbags.rosbag2 import Writer as Writer2

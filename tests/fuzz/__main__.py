@@ -53,7 +53,7 @@ def _told(name: str, results: Iterable[tuple[str, list[str]]]) -> int:
 
 
 def _commands(count: int, seed: int, place: Path) -> Iterable[tuple[str, list[str]]]:
-    composer = Composer()
+    composer = Composer(many=True)
     for number in range(count):
         words = commands.drawn(composer, random.Random(f"{seed} {number}"))
         with in_time(_LIMIT_S):
@@ -62,7 +62,7 @@ def _commands(count: int, seed: int, place: Path) -> Iterable[tuple[str, list[st
 
 
 def _flights(count: int, seed: int, place: Path) -> Iterable[tuple[str, list[str]]]:
-    return flights.fly(count, seed, place)
+    return flights.fly(Composer(many=True), count, seed, place)
 
 
 def _folders(count: int, seed: int, place: Path) -> Iterable[tuple[str, list[str]]]:

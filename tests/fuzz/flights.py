@@ -36,9 +36,9 @@ _FINITE = (
 )  # fmt: skip
 
 
-def jobs(count: int, seed: int, place: Path) -> Iterator[Job]:
+def jobs(composer: Composer, count: int, seed: int, place: Path) -> Iterator[Job]:
     """So many jobs of flights that compose."""
-    composer, chance = Composer(), random.Random(seed)
+    chance = random.Random(seed)
     made = 0
     while made < count:
         words = drawn(composer, chance, wild=False)
@@ -64,10 +64,12 @@ def _clashes(word: str, taken: set[str]) -> bool:
     return word.split("=")[0].split(".")[0] in taken
 
 
-def fly(count: int, seed: int, place: Path, n_jobs: int = 2) -> Iterator[tuple[str, list[str]]]:
+def fly(
+    composer: Composer, count: int, seed: int, place: Path, n_jobs: int = 2
+) -> Iterator[tuple[str, list[str]]]:
     """Fly; the status of each, and what ended as nothing may end."""
     start_fork_server([PRELOAD])
-    for done in run_local(fly_job, jobs(count, seed, place), n_jobs=n_jobs, limits=LIMITS):
+    for done in run_local(fly_job, jobs(composer, count, seed, place), n_jobs=n_jobs, limits=LIMITS):
         yield str(done.answer.status), list(_faults(done))
 
 

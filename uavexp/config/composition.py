@@ -68,6 +68,7 @@ class Composer:
     """Composes cells from the shipped configuration and, optionally, a user's folder."""
 
     user_folder: Path | None = None
+    many: bool = False  # commands are to come: trees of single options are kept and joined
     options: dict[str, dict[str, Path]] = field(init=False)
     experiments: dict[str, Path] = field(init=False)
     _keys: tuple[str, ...] = field(init=False, repr=False)  # of a composed tree
@@ -94,7 +95,7 @@ class Composer:
         runner = {key: typed.pop(key) for key in list(typed) if key.split(".")[0] == RUNNER_GROUP}
         experiment = self._experiment(ours.get(EXPERIMENT_GROUP))
         labelled, axes = self._grid(experiment, list(typed.values()))
-        self._trees.many = len(labelled) > _FEW_CELLS
+        self._trees.many = self.many or len(labelled) > _FEW_CELLS
         defaults = self.compose([*_single(runner.values()), *labelled[0].settings])
         seed = (
             ours["seed"].values if "seed" in ours else (experiment.seed if experiment else defaults["seed"],)

@@ -18,6 +18,7 @@ from multiprocessing.reduction import recv_handle
 from pathlib import Path
 from typing import Any
 
+from uavexp.errors import UavexpError
 from uavexp.store.records import Status
 from uavexp.sweep.faults import failure
 from uavexp.sweep.job import Answer, Call
@@ -30,7 +31,7 @@ _GROWTH_MB = 300.0  # address space: a child that its calls have made so much la
 
 
 def run_child(connection: Connection, call: Call, memory_mb: float) -> None:
-    """Make calls and send their answers, until one fails or this process has done its share.
+    """Make calls and send their answers, until one breaks or this process has done its share.
 
     Args:
         connection: to the supervisor, who sends the descriptor of a file for what the child prints, then
@@ -60,14 +61,14 @@ def run_child(connection: Connection, call: Call, memory_mb: float) -> None:
 
 
 def _answer(call: Call, payload: Any, connection: Connection, memory_mb: float) -> tuple[bool, bytes]:
-    """Make one call; whether it went well, and its pickled answer."""
+    """Make one call; whether this process is as good as before, and its pickled answer."""
     _limit_memory(memory_mb)
     try:
         value = call(payload, lambda time_s, words: connection.send((time_s, words)))
         return True, pickle.dumps(Answer(status=Status.OK, value=value))
     except BaseException as error:
         _lift_memory_limit()  # or there is no room to tell
-        return False, pickle.dumps(failure(error))
+        return isinstance(error, UavexpError), pickle.dumps(failure(error))  # a refusal breaks nothing
 
 
 def die_with_parent() -> None:

@@ -2,7 +2,7 @@
 
 joblib's own process pool loses the whole sweep when one worker dies. Its threads give each
 job to a child of a fork server that has the heavy imports and compiled kernels already. A child
-does several jobs, one at a time; it is replaced after the first that does not go well, so
+does several jobs, one at a time; it is replaced after the first that breaks, so
 that a crash, a hang or a hunger for memory costs that job alone.
 """
 

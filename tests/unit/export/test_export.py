@@ -9,12 +9,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-import trimesh
 import yaml
-from mcap.reader import make_reader
-from mcap_protobuf.decoder import DecoderFactory
 from PIL import Image
-from rosbags.highlevel import AnyReader
 from scipy.spatial.transform import Rotation
 
 from tests.folders import DATA
@@ -27,6 +23,10 @@ from uavexp.store.logs import log_arrays, pack
 from uavexp.store.stored_trial import StoredTrial, read_trial
 from uavexp.types import Shape
 
+trimesh = pytest.importorskip("trimesh")
+make_reader = pytest.importorskip("mcap.reader").make_reader
+DecoderFactory = pytest.importorskip("mcap_protobuf.decoder").DecoderFactory
+AnyReader = pytest.importorskip("rosbags.highlevel").AnyReader
 FLOWN = DATA / "study" / "trials" / "mcr_rooms-s0-a1cbaac7e702"
 SIZE_M = 0.1
 

@@ -120,7 +120,7 @@ def test_damage_ends_in_content_or_one_line(damage: tuple[float, list[tuple[floa
 
 
 def test_trimesh_reads_the_same(tmp_path: Path) -> None:
-    import trimesh
+    trimesh = pytest.importorskip("trimesh")
 
     other = trimesh.load(DATA / "flat.obj", process=False, force="mesh")
     content = formats.read(DATA / "flat.obj", formats.Options())

@@ -123,7 +123,7 @@ def test_damage_ends_in_content_or_one_line(
 
 
 def test_trimesh_reads_the_same() -> None:
-    import trimesh
+    trimesh = pytest.importorskip("trimesh")
 
     files = [DATA / "flat.stl", *SHARED.glob("worlds/*/orig/*.stl")]
     for file in files:

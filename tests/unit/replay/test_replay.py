@@ -28,7 +28,7 @@ Rows = list[tuple[int, np.ndarray, np.ndarray]]  # frame, position, camera rotat
 
 def corridor() -> Scene:
     """A corridor along x, 3 m wide, with a pillar whose face is 0.3 m from its middle line."""
-    import trimesh
+    trimesh = pytest.importorskip("trimesh")
 
     shell = trimesh.creation.box(bounds=[[-1, -1.5, 0], [12, 1.5, 3]])
     pillar = trimesh.creation.box(bounds=[[PILLAR_M, 0.3, 0], [PILLAR_M + 0.4, 0.7, 3]])

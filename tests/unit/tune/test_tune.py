@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import optuna
 import pandas as pd
 import pytest
 
@@ -16,6 +15,7 @@ from uavexp.tune.__main__ import task_of
 from uavexp.tune.objective import front, means, objectives
 from uavexp.tune.space import Choice, Range, label_of, split
 
+optuna = pytest.importorskip("optuna", reason="tuning is an extra: pip install 'uavexp[tune]'")
 TBR = ("tune", *QUICK, "strategy=tbr", "trigger.interval_s=0.2:6", "seed=100:102", "runner.n_jobs=1")
 
 
