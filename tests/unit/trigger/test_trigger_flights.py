@@ -16,7 +16,17 @@ from uavexp.log import TrialLog
 from uavexp.metrics.replanning import answers
 from uavexp.types import Outcome, PlanStatus
 
-REPLANNING = ("any_of", "collision_check", "distance", "expiry", "frontier_covered", "mcr", "tbr")
+REPLANNING = (
+    "any_of",
+    "collision_check",
+    "distance",
+    "expiry",
+    "frontier_covered",
+    "gain",
+    "mcr",
+    "mcr_adaptive",
+    "tbr",
+)
 COLLISION_ONLY = (
     "collision_check",
     "expiry",
