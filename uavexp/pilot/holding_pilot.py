@@ -7,102 +7,45 @@ no plan is found: the goal is set aside, the next goals are tried, then the vehi
 within its stopping distance, holds, and tries again at the explorer's rate. A vehicle that
 has fallen behind its reference, whatever held it, stops where it is, and a plan is asked for.
 What the safety lets be flown of a plan is asked at every ESDF update (`safety.base.Guard`): a
-plan that it refuses has failed, one that it has held for `held_s` is made anew, the second
-time at one place to another goal. A vehicle that gets no further so climbs a ladder (`recovery`).
-What it stands against though nothing is mapped there is noted in the map (`touch`).
+plan that it refuses has failed, one that it has held for `held_s` is made anew, the second time
+at one place to another goal; so is one at whose end the vehicle stands though its goal is offered yet. A
+vehicle that gets no further so climbs a ladder (`recovery`). What it stands against though nothing
+is mapped there is noted in the map (`touch`).
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from uavexp import causes
 from uavexp.answers import ask
 from uavexp.arrays import Float
-from uavexp.braking import with_stop
-from uavexp.log import Replan
-from uavexp.pace import AS_PLANNED
-from uavexp.pilot.base import Crew
-from uavexp.pilot.flown import Flown, is_held, stopped_off
+from uavexp.pilot.flown import Flown, stopped_off
 from uavexp.pilot.following import reference_of, row_of
 from uavexp.pilot.glance import towards_encounter_rad
 from uavexp.pilot.heading import room_to_turn
 from uavexp.pilot.noting import NO_GOAL, error_of, here, replan_of, target_of
-from uavexp.pilot.recovering import Recovering, ending, tried
+from uavexp.pilot.recovering import tried
 from uavexp.pilot.recovery import Rung
-from uavexp.pilot.rules import Rules
-from uavexp.pilot.steering import Steering
+from uavexp.pilot.requesting import ANYWAY, GOALS_FAULT, Motion, plan_request, planned
 from uavexp.pilot.touch import BALL_M
-from uavexp.trajectory import Trajectory, evaluate, hover_before, sample_times
-from uavexp.types import (
-    Decision,
-    Goal,
-    Observation,
-    Outcome,
-    PlanRequest,
-    PlanResult,
-    PlanStatus,
-    Reference,
-    Squeeze,
-)
+from uavexp.pilot.underway import Underway
+from uavexp.types import Decision, Goal, Observation, Reference, Squeeze
 
-_GOALS_FAULT = (PlanStatus.GOAL_BLOCKED, PlanStatus.NO_PATH, PlanStatus.NOT_CLEAR)  # another may do
-_ANYWAY = (*_GOALS_FAULT, PlanStatus.LIMITS, PlanStatus.SOLVER)  # the same for a vehicle that is lost
 _WARY_S = 5.0  # after a touch
 _OFF_M = 0.3  # clearance of a place to draw back to from what was touched
-_AHEAD_S = 0.1
-_SAME_PLACE_M = 0.5
 
 
 @dataclass(slots=True, kw_only=True)
-class HoldingPilot:
-    """What is flown, and every planning request made on the way."""
+class HoldingPilot(Underway):
+    """`Underway`, and the rules by which it goes on."""
 
-    rules: Rules
-    crew: Crew
-    steering: Steering
-    recovery: Recovering
-    flown: Flown | None = None
-    best_goal: Goal | None = None
-    replans: list[Replan] = field(default_factory=list)
-    dropped_triggers: int = 0
-    first_plan: PlanResult | None = None
-    failure: str = ""
-    _pending: Flown | None = None  # a plan waiting for its latency to pass
     _wait_for_rest: bool = False  # after the safety's brake: no new plan before standstill
     _stopped_s: float = -math.inf  # when it stopped where it was last
     _touched_s: float = -math.inf  # when something was touched last
-    _held_m: Float | None = None  # (3,) where the safety held the vehicle last
-
-    @property
-    def trajectory(self) -> Trajectory | None:
-        """Being flown; None before the first plan."""
-        return None if self.flown is None else self.flown.trajectory
-
-    @property
-    def goal(self) -> Goal | None:
-        """Of that trajectory."""
-        return None if self.flown is None else self.flown.goal
-
-    @property
-    def recovers(self) -> bool:
-        """Whether it is lost and still tries something."""
-        return self.recovery.lasts
-
-    @property
-    def given_up(self) -> Outcome | None:
-        """How the flight ends when nothing is left to be tried."""
-        if not self.recovery.ladder.ended:
-            return None
-        return ending(self.replans, has_goal=self.best_goal is not None)
-
-    @property
-    def ever_planned(self) -> bool:
-        """Whether any plan was found."""
-        return any(replan.status is PlanStatus.OK for replan in self.replans)
 
     def reference(self, time_s: float, step_s: float) -> Reference:
         """What to follow now; adopts a plan whose time has come and turns the yaw."""
@@ -140,6 +83,8 @@ class HoldingPilot:
             self.request(Decision(replan=True, cause=cause), observation)
         elif self._waits_s(observation.time_s) >= self.rules.held_s:
             self._ask_anew(observation)
+        elif self._idles(observation.time_s):
+            self._ask_anew(observation, been_there=self.goal is not None and not self.goal.is_target)
 
     def decide(self, observation: Observation) -> float:
         """Ask safety and trigger; return the trigger's score."""
@@ -181,14 +126,16 @@ class HoldingPilot:
         for _ in range(self.rules.goals_per_request):
             if goal is None:
                 break
-            result, flown = self._plan(observation, goal, squeeze)
+            asked = plan_request(self.crew, observation, self._start(observation), goal, squeeze)
+            parts = (self.crew, self.steering, self.recovery)
+            result, flown = planned(*parts, asked, observation, self._wanted_rad)
             self.replans.append(replan_of(decision, observation, goal, result, self.trajectory))
             if flown is not None:
                 self.first_plan = self.first_plan or result
                 self._accept(flown, observation)
                 return
             self.failure = f"{result.status.value}: {result.reason}"
-            if result.status not in (_ANYWAY if self.recovery.lost else _GOALS_FAULT):
+            if result.status not in (ANYWAY if self.recovery.lost else GOALS_FAULT):
                 break
             self.recovery.refused_s = observation.time_s
             self.crew.explorer.reject(goal.position_m, observation.time_s)
@@ -202,51 +149,23 @@ class HoldingPilot:
             self.best_goal = self.crew.explorer.select(observation, fresh=fresh)
         return self.best_goal
 
-    def _plan(
-        self, observation: Observation, goal: Goal, squeeze: Squeeze | None
-    ) -> tuple[PlanResult, Flown | None]:
-        """The planner's answer, and what is to be flown of it: nothing where the safety refuses."""
-        result = ask(PlanResult, self.crew.planner.plan, self._plan_request(observation, goal, squeeze))
-        self.crew.watch.add("search", result.wall_search_s)
-        self.crew.watch.add("optimise", result.wall_optimise_s)
-        plan = result.trajectory
-        if plan is None:
-            return result, None
-        turn_s = self.steering.first_s(plan, self._wanted_rad)
-        flown = with_stop(hover_before(plan, turn_s), self.crew.limits)
-        rate = AS_PLANNED.at(plan.start_s)[1:]
-        way = self.crew.guard.flyable(flown, plan.start_s, rate, observation, squeeze=squeeze)
-        refused = way.refused
-        if not refused and self.recovery.lost and is_held(flown, way.pace):
-            self.recovery.note_hold(evaluate(flown, sample_times(flown, flown.start_s, _AHEAD_S))[0])
-            refused = "the safety holds it where it stands"
-        if refused:
-            return replace(result, status=PlanStatus.LIMITS, trajectory=None, reason=refused), None
-        moves_s = plan.start_s + turn_s
-        return result, Flown(trajectory=flown, goal=goal, moves_s=moves_s, pace=way.pace, squeeze=squeeze)
-
-    def _plan_request(self, observation: Observation, goal: Goal, squeeze: Squeeze | None) -> PlanRequest:
-        """From the reference at t + latency; from the measured state if that is far off or in an obstacle."""
-        start_s = observation.time_s + self.crew.latency_s
-        state = observation.state
-        position_m, velocity_mps, acceleration_mps2 = self._planned_state(start_s)
+    def _start(self, observation: Observation) -> Motion:
+        """The reference at t + latency; the measured state if that is far off or in an obstacle."""
+        start_s, state = observation.time_s + self.crew.latency_s, observation.state
+        start = self._planned_state(start_s)
         left = error_of(observation) >= self.rules.restart_error_m and self._stopped_s < observation.time_s
         far = left or self._waits_s(start_s) > 0.0
-        if far or observation.field.distance_m(position_m[None])[0] <= 0.0:
-            position_m = state.position_m + self.crew.latency_s * state.velocity_mps
-            velocity_mps, acceleration_mps2 = state.velocity_mps, np.zeros(3)
-        return PlanRequest(
-            time_s=start_s, position_m=position_m, velocity_mps=velocity_mps,
-            acceleration_mps2=acceleration_mps2, goal=goal, field=observation.field,
-            flight_bounds_m=self.crew.flight_bounds_m, tracks=observation.tracks, squeeze=squeeze,
-        )  # fmt: skip
+        if far or observation.field.distance_m(start[0][None])[0] <= 0.0:
+            ahead_m = state.position_m + self.crew.latency_s * state.velocity_mps
+            return ahead_m, state.velocity_mps, np.zeros(3)
+        return start
 
     @property
     def _wanted_rad(self) -> float:
         """The yaw that g* asks for; NaN: none."""
         return math.nan if self.best_goal is None else self.best_goal.yaw_rad
 
-    def _planned_state(self, time_s: float) -> tuple[Float, Float, Float]:
+    def _planned_state(self, time_s: float) -> Motion:
         if self.flown is None:
             return self.crew.start_m, np.zeros(3), np.zeros(3)
         return self.flown.state(time_s)
@@ -256,25 +175,12 @@ class HoldingPilot:
         self.failure, self._wait_for_rest = "", False
         self.crew.trigger.planned(flown.trajectory, observation.field)
 
-    def _moving(self, time_s: float) -> bool:
-        return self.flown is not None and time_s < self.flown.ends_s
-
-    def _waits_s(self, time_s: float) -> float:
-        """How long the safety has held the vehicle on a plan, s; not positive: it does not."""
-        held = self.flown is not None and self._pending is None and not self.failure
-        return time_s - self.flown.waits_since_s if held and self.flown is not None else -math.inf
-
-    def _ask_anew(self, observation: Observation) -> None:
-        """Plan from where the safety holds the vehicle: to another goal, if that has not helped before."""
-        here_m, before_m = observation.state.position_m.copy(), self._held_m
-        again = before_m is not None and float(np.linalg.norm(here_m - before_m)) < _SAME_PLACE_M
-        if self.flown is not None:
-            own_s, plan = self.flown.pace.at(observation.time_s)[0], self.flown.trajectory
-            self.recovery.note_hold(evaluate(plan, sample_times(plan, own_s, _AHEAD_S))[0])
-        if again and self.goal is not None:
+    def _ask_anew(self, observation: Observation, *, been_there: bool = False) -> None:
+        """Plan from where the vehicle is held or stands: to another goal, if this one has not helped."""
+        again = self.flown is not None and self.recovery.held_again(observation, self.flown)
+        if (again or been_there) and self.goal is not None:
             self.recovery.refused_s = observation.time_s
             self.crew.explorer.reject(self.goal.position_m, observation.time_s)
-        self._held_m = here_m
         self.request(Decision(replan=True, cause=causes.HELD.name), observation)
 
     def _miss_goals(self, observation: Observation) -> None:

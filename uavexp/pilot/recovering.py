@@ -19,12 +19,15 @@ from uavexp.pilot.recovery import Ladder, Patience, Rung, Situation, climbed
 from uavexp.pilot.rules import Rules
 from uavexp.pilot.touch import Touch, ball_m, is_stopped_short, touched_m
 from uavexp.safety.base import Guard
+from uavexp.trajectory import Trajectory, evaluate, sample_times
 from uavexp.types import Goal, Limits, Observation, Outcome, PlanResult, PlanStatus, Squeeze
 
 _SET_ASIDE_S = 12.0  # goals that were refused come back by then
 _STEP_M = 0.02  # of clearance
 _SPARE_M = 0.02  # between the body's half width and an obstacle
 _BEYOND = 2.0  # body radii from where the safety holds the vehicle to what holds it
+_SAMPLE_S = 0.1
+_SAME_PLACE_M = 0.5
 _NO_WAY = (PlanStatus.NO_PATH, PlanStatus.GOAL_BLOCKED, PlanStatus.NOT_CLEAR)
 
 
@@ -38,6 +41,7 @@ class Recovering:
     touch: Touch = field(default_factory=Touch)
     refused_s: float = -math.inf  # when a goal was set aside last, because no plan led there
     held_at_m: Float | None = None  # (3,) what the safety holds the vehicle back from
+    _held_m: Float | None = None  # (3,) where the safety held the vehicle last
     _way_m: Float = field(default_factory=lambda: np.zeros((0, 3)))
     _touched_m: list[Float] = field(default_factory=list)
     _seen_m3: float = 0.0
@@ -124,8 +128,16 @@ class Recovering:
         steps_m = (least_m + _STEP_M, least_m) if self.rules.lesser_clearance_m > 0.0 else ()
         return tuple(Squeeze(clearance_m=m, speed_mps=self.rules.lesser_speed_mps) for m in steps_m)
 
-    def note_hold(self, way_m: Float) -> None:
-        """Remember what lies ahead on a way (N, 3) that the safety holds the vehicle on."""
+    def held_again(self, observation: Observation, flown: Flown) -> bool:
+        """Remember where the safety holds the vehicle, and on what; whether it did so here before."""
+        here_m, before_m = observation.state.position_m.copy(), self._held_m
+        self.note_hold(flown.trajectory, flown.pace.at(observation.time_s)[0])
+        self._held_m = here_m
+        return before_m is not None and float(np.linalg.norm(here_m - before_m)) < _SAME_PLACE_M
+
+    def note_hold(self, plan: Trajectory, from_s: float) -> None:
+        """Remember what lies ahead on a plan, from its own time on, that the safety holds the vehicle on."""
+        way_m = evaluate(plan, sample_times(plan, from_s, _SAMPLE_S))[0]
         far = np.linalg.norm(way_m - way_m[0], axis=1) >= _BEYOND * self.limits.body_radius_m
         self.held_at_m = way_m[int(np.argmax(far))] if far.any() else None
 

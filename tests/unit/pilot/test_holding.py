@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -243,3 +243,29 @@ def test_a_request_takes_the_best_goal_or_the_kept_one_as_it_is_told(fresh_goal:
     pilot.explore(see(room(), 0.0, pilot.reference(0.0, 0.01)))
     expected = TARGET if fresh_goal else TARGET - np.array([3.0, 0.0, 0.0])
     assert np.allclose(pilot.replans[0].goal_m, expected)
+
+
+@dataclass(slots=True)
+class AlwaysThere:
+    """An explorer that offers the same place for ever; `rejected` counts refusals."""
+
+    place_m: np.ndarray
+    rejected: int = 0
+
+    def select(self, observation: Observation, *, fresh: bool = False) -> Goal | None:
+        return Goal(position_m=self.place_m, is_target=False, score=0.0)
+
+    def reject(self, position_m: np.ndarray, time_s: float) -> None:
+        self.rejected += 1
+
+
+def test_a_vehicle_that_stands_at_the_end_of_its_plan_asks_for_a_way_to_the_goal_that_is_left() -> None:
+    """A map-change trigger never asks: the goal is the one it flew to, which is set aside."""
+    pilot = make(Mcr())
+    explorer = AlwaysThere(np.array([3.0, 2.0, 1.0]))
+    pilot.crew = replace(pilot.crew, explorer=explorer)
+    fly(pilot, {0.0: room()}, 16.0)
+    held = [replan.time_s for replan in pilot.replans if replan.cause == "held"]
+    assert len(held) >= 2
+    assert held[0] >= 2.0 * pilot.rules.recover_after_s
+    assert explorer.rejected >= 1
