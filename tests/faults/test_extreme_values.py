@@ -42,6 +42,8 @@ def test_it_is_refused_before_anything_is_made(typed: str) -> None:
 @pytest.mark.parametrize(
     ("typed", "words"),
     [
+        ("safety=[0,0,0]", r"safety=\[0,0,0\]: no such option; safety may be"),
+        ("planner.shape=[]", r"planner.shape=\[\]: no such option"),
         ("controller.drag_kgpm=1000", "at most 1.18 kg/m can be flown"),
         ("controller=flatness controller.drag_kgpm=2", "at most 1.18 kg/m can be flown"),
         ("vehicle=quadrotor vehicle.drag_coefficient=1e6", "at most 1.18 kg/m can be flown"),

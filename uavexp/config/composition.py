@@ -233,8 +233,9 @@ class Composer:
             raise ConfigError(f"{group}={name}: {told}{nearest(group, self._groups)}")
         if isinstance(name, str) and name in known:
             return name
+        name = name if isinstance(name, str) else render(name)
         elsewhere = [other for other, options in self.options.items() if name in options]
-        hint = f" ({name} is in {elsewhere[0]})" if elsewhere else nearest(str(name), known)
+        hint = f" ({name} is in {elsewhere[0]})" if elsewhere else nearest(name, known)
         raise ConfigError(f"{group}={name}: no such option{hint}; {group} may be {', '.join(known)}")
 
     def _apply(self, tree: dict[str, Any], setting: Setting) -> None:
