@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from uavexp import formats
 from uavexp.arrays import Float
 from uavexp.cloud.__main__ import main
 from uavexp.cloud.cloud_file import CloudError, read_cloud
@@ -19,6 +20,7 @@ from uavexp.cloud.simulated_scan import simulated_scan
 from uavexp.cloud.traversability import obstacles
 from uavexp.cloud.voxels import packed, unpacked, voxelise
 from uavexp.errors import ConfigError, WorldError
+from uavexp.formats import SOLID
 from uavexp.scene import Scene
 from uavexp.world.boxes import Boxes
 
@@ -205,3 +207,19 @@ def test_a_plan_is_no_cloud(tmp_path: Path) -> None:
 def test_impossible_settings_are_refused(name: str, value: float) -> None:
     with pytest.raises(ConfigError, match=name):
         CloudPipeline(**{name: value})  # type: ignore[arg-type]
+
+
+def test_its_obstacles_are_a_building_to_fly_in(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    cloud, voxels = tmp_path / "room.npz", tmp_path / "voxels.npz"
+    stray = np.array([[3.0, 2.5, 1.5], [3.3, 1.0, 1.2]])
+    np.savez(cloud, points=np.vstack([scan_of_a_room(60_000), stray]))
+    assert main([str(cloud), "--voxel", "0.1", "--out", str(voxels)]) == 0
+    counts = json.loads(capsys.readouterr().out)
+    cells = formats.read(voxels, formats.Options()).cells
+    assert cells is not None
+    centres_m = cells.origin + (np.argwhere(cells.state == SOLID) + 0.5) * cells.size
+    assert len(centres_m) == counts["obstacle_voxels"]
+    for point_m in stray:  # what the pipeline took for outliers or specks is in nobody's way
+        assert np.linalg.norm(centres_m - point_m, axis=1).min() > 0.3
+    assert main([str(cloud), "--out", str(tmp_path / "voxels.ply")]) == 2
+    assert "ends with .npz" in capsys.readouterr().err

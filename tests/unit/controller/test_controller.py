@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from uavexp.controller.position_velocity import PositionVelocity
+from uavexp.controller.position_velocity import PositionVelocity, thrust_and_attitude
 from uavexp.errors import ConfigError
 from uavexp.geometry import rotation_from_quaternion, yaw_of
-from uavexp.types import Reference, State
+from uavexp.types import Limits, Reference, State
 from uavexp.vehicle.point_mass import PointMass
 from uavexp.vehicle.quadrotor import Quadrotor
 
@@ -218,3 +218,20 @@ def test_a_thrust_that_turns_at_half_the_body_rate_is_followed():
     assert max(worst_error_m(0.5, seed) for seed in range(4)) < 0.2
     assert max(worst_error_m(0.4, seed) for seed in range(4)) < 0.12
     assert max(worst_error_m(1.0, seed) for seed in range(4)) > 0.3
+
+
+@pytest.mark.parametrize(("speed_mps", "most_mps2"), [(2.4, 0.3), (2.5, 0.0), (2.0, 1.5)])
+def test_what_pushes_on_fades_towards_the_speed_limit(speed_mps: float, most_mps2: float) -> None:
+    """At most 3/s of what is left to 2.5 m/s, along the motion; the reference runs away in front."""
+    limits = Limits(
+        max_speed_mps=2.5, max_acceleration_mps2=2.5, max_body_rate_radps=4.0, body_size_m=(0.3, 0.3, 0.1)
+    )
+    controller = PositionVelocity(speed_gain_per_s=3.0)
+    controller.reset(limits, 1.0)
+    way = np.array([np.cos(0.4), np.sin(0.4), 0.0])
+    _, attitude = thrust_and_attitude(
+        np.zeros(3), speed_mps * way, np.array([1.0, 0.0, 0.0, 0.0]), 5.0 * way, 2.5 * way, 2.5 * way, 0.0,
+        controller.gains,
+    )  # fmt: skip
+    up = rotation_from_quaternion(attitude)[:, 2]
+    assert float(9.81 * (up[:2] @ way[:2]) / up[2]) == pytest.approx(most_mps2, abs=0.01)

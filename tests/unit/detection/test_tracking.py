@@ -340,3 +340,17 @@ def test_a_lost_track_that_may_be_anywhere_does_not_take_the_one_that_is_seen() 
     lost, seen = tracker.tracks
     assert lost.unseen_s == pytest.approx(2.5)
     assert seen.unseen_s == 0.0
+
+
+@pytest.mark.parametrize("fading", [0.0, 0.3, 0.9])
+def test_the_misfit_keeps_its_share_of_the_innovations_before(fading: float) -> None:
+    """Mehra's average: old share times what was, the rest is the squared innovation over its expectation."""
+    filter_ = MotionFilter(first_m=np.zeros(3), motion=MotionModel(fading=fading))
+    expected = 1.0
+    for place_m in (np.array([0.5, 0.0, 0.0]), np.array([0.5, 0.9, 0.0]), np.array([0.6, 1.0, 0.1])):
+        filter_.predict(0.1, np.full(3, 0.3), None)
+        away = place_m - filter_.position_m
+        squared = float(away @ np.linalg.solve(filter_.innovation_covariance, away))
+        expected = fading * expected + (1.0 - fading) * squared / 3.0
+        filter_.observe(place_m)
+        assert filter_.misfit == pytest.approx(expected)

@@ -10,13 +10,14 @@ law), and it is never a default.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from uavexp.arrays import Float
-from uavexp.parameters import option
+from uavexp.parameters import NonNegative, option
 from uavexp.planner.constraints import Constraints
 from uavexp.planner.find.base import FoundPath
 from uavexp.planner.movers.moving import MovingObstacles
@@ -33,6 +34,8 @@ class WaypointSpline:
     """Unchecked spline through the corners; see the module. Times that came with a path are not used."""
 
     sees_movers: ClassVar[bool] = False
+    top_speed_mps: NonNegative = 0.0  # m/s, of the law along the polyline; 0: the vehicle's. With
+    # planner.find.corner_speed_mps of straight edges corners are filtered and timed by one law [ours]
 
     def shape(
         self, request: PlanRequest, found: FoundPath, constraints: Constraints, movers: MovingObstacles
@@ -47,7 +50,8 @@ class WaypointSpline:
         corners = np.concatenate([path_m[:1], path_m[1:][apart]])
         if len(corners) < 2:
             corners = np.concatenate([path_m[:1], path_m[-1:]])
-        times = passing_times_s(corners, limits)
+        slow = min(self.top_speed_mps or limits.max_speed_mps, limits.max_speed_mps)
+        times = passing_times_s(corners, replace(limits, max_speed_mps=slow))
         spline = CubicSpline(times, corners, bc_type=((1, request.velocity_mps), (1, np.zeros(3))))
         trajectory = Trajectory(
             breaks_s=request.time_s + times,

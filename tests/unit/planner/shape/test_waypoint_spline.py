@@ -66,3 +66,17 @@ def test_a_right_angle_breaks_the_limits() -> None:
     _, velocity, acceleration = evaluate(trajectory, sample_times(trajectory, trajectory.start_s, 1e-3))
     speed, size = np.linalg.norm(velocity, axis=1), np.linalg.norm(acceleration, axis=1)
     assert size.max() > 1.05 * A or speed.max() > 1.05 * V
+
+
+@pytest.mark.parametrize("top_mps", [0.5, 1.0])
+def test_a_slower_law_runs_along_the_polyline_at_its_speed(top_mps: float) -> None:
+    """Corners that are filtered at 1 m/s are timed at 1 m/s: no faster, and no longer than that asks."""
+    path = np.array([[0.0, 0.0, 1.0], [6.0, 0.0, 1.0], [6.0, 6.0, 1.0], [12.0, 6.0, 1.0]])
+    result = shaped(WaypointSpline(top_speed_mps=top_mps), request(path), path, LIMITS)
+    assert result.trajectory is not None
+    assert result.trajectory.duration_s == pytest.approx(18.0 / top_mps + top_mps / A)
+    slow = result.trajectory
+    _, _, acceleration = evaluate(slow, sample_times(slow, slow.start_s, 1e-3))
+    usual = spline(path)
+    _, _, stronger = evaluate(usual, sample_times(usual, usual.start_s, 1e-3))
+    assert np.linalg.norm(acceleration, axis=1).max() <= np.linalg.norm(stronger, axis=1).max()
