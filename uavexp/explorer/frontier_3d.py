@@ -52,6 +52,7 @@ from uavexp.parameters import (
 from uavexp.types import Goal, Limits, Observation
 
 _ARRIVED_M, _ARRIVED_RAD, _DWELL_S = 0.35, 0.3, 0.5
+_DETOUR_M = 3.0  # by which the way there may be longer than to the cluster's nearest place
 _SAME_M = 1.0  # a cluster whose place is so near to the goal goes on where the goal was
 
 
@@ -223,8 +224,21 @@ class Frontier3d:
 
     def _chosen(self, space: Space, observation: Observation) -> _Choice | None:
         """The target if seen cells lead there, else the best place; over worse ways if there is no other."""
+        here_m = observation.state.position_m
+        bound = observation.target_m is not None  # then the best place may be a new one far away
+        clusters = space.viewpoints.clusters(self.looks, here_m, whole=bound)
+        choice = self._over(space, observation, clusters)
+        if choice is None and space.viewpoints.waiting:
+            clusters = space.viewpoints.clusters(self.looks, here_m, whole=True)
+            choice = self._over(space, observation, clusters)
+        if choice is not None or not clusters or not self._aside:
+            return choice
+        self._aside.pop(0)  # what was set aside is tried again before all is given up
+        return self._chosen(space, observation)
+
+    def _over(self, space: Space, observation: Observation, clusters: Sequence[Cluster]) -> _Choice | None:
+        """The choice among clusters, over the best ways that lead to any."""
         here_m, target_m = observation.state.position_m, observation.target_m
-        clusters = space.viewpoints.clusters(self.looks, here_m)
         for known in (WIDE, NARROWER, ANY):
             space.ways.begin(space.cell_of(here_m), known)
             to_target_m = space.to_target_m()
@@ -233,10 +247,7 @@ class Frontier3d:
             choice = self._best(space, observation, clusters)
             if choice is not None:
                 return choice
-        if not clusters or not self._aside:
-            return None
-        self._aside.pop(0)  # what was set aside is tried again before all is given up
-        return self._chosen(space, observation)
+        return None
 
     def _bound_for(
         self, space: Space, observation: Observation, place_m: Float, score: float,
@@ -266,8 +277,9 @@ class Frontier3d:
 
     def _best(self, space: Space, observation: Observation, clusters: Sequence[Cluster]) -> _Choice | None:
         """The place to go to first."""
-        here_m, kept = observation.state.position_m, self._choice
-        found = space.candidates(clusters, self._aside_of, here_m, self.hysteresis_m + self.turn_m)
+        kept = self._choice
+        spare_m = self.hysteresis_m + 2.0 * self.turn_m
+        found = space.candidates(clusters, self._aside_of, spare_m)
         if not found.clusters:
             return None
         cost_m = found.there_m + self._turning_m(observation, found)
@@ -282,7 +294,11 @@ class Frontier3d:
             first = int(np.argmin(cost_m))
         if not math.isfinite(cost_m[first]):
             return None
-        if kept is not None and going_on[first] and space.leads_to(kept.place_m):
+        if (
+            kept is not None
+            and going_on[first]
+            and space.leads_to(kept.place_m, found.there_m[first] + _DETOUR_M)
+        ):
             place_m, shown = kept.place_m, (kept.cells, kept.yaw_rad)
         else:
             place_m, shown = found.eyes_m[first], self._shown(space, found, first)

@@ -20,6 +20,7 @@ from uavexp.metrics import path, replanning, tracking
 from uavexp.report.flights import RULE, SharedWorld, scene_at, shared_world, three_arms
 from uavexp.report.looks import looks_of
 from uavexp.report.results import Results
+from uavexp.report.search_view import chosen_goals, frontier_m
 from uavexp.types import World
 
 MOST_POINTS = 600  # of a path
@@ -125,9 +126,18 @@ def _flight(world: World, log: TrialLog) -> Json:
         "reference": _axes(log.steps.reference_position_m[rows]),
         "contacts": _axes(np.array([contact.position_m for contact in log.contacts]).reshape(-1, 3)),
         "replans": [_replan(number, replan) for number, replan in enumerate(replanning.executed(log), 1)],
+        "goals": _axes(np.array([replan.goal_m for replan in chosen_goals(world, log)]).reshape(-1, 3)),
+        "frontier": _frontier(log, float(world.start_m[2])),
         "map": voxels(log.mapped_m),
         **({"movers": _movers(log, rows[::3])} if log.movers.shape.size else {}),
     }
+
+
+def _frontier(log: TrialLog, height_m: float) -> list[list[float]]:
+    """The frontier that the flight left at a height, thinned."""
+    cells_m = frontier_m(log, height_m)
+    cells_m = cells_m[:: max(1, -(-len(cells_m) // MOST_POINTS))]
+    return _axes(np.column_stack([cells_m, np.full(len(cells_m), height_m)]))
 
 
 def _movers(log: TrialLog, rows: Int) -> Json:

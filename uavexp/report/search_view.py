@@ -17,7 +17,7 @@ from uavexp.types import World
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_SAME_M = 0.3  # goals so near to one another are one: delta_g of paper 1
+SAME_M = 0.3  # goals so near to one another are one: delta_g of paper 1
 _NUMBERED = 40  # goals; more are drawn without their numbers
 
 
@@ -63,8 +63,8 @@ def chosen_goals(world: World, log: TrialLog) -> list[Replan]:
     """Requests that brought a plan to another place than the one before and than the target, in order."""
     found: list[Replan] = []
     for replan in log.replans:
-        is_target = float(np.linalg.norm(replan.goal_m - world.target_m)) < _SAME_M
-        same = bool(found) and float(np.linalg.norm(replan.goal_m - found[-1].goal_m)) < _SAME_M
+        is_target = float(np.linalg.norm(replan.goal_m - world.target_m)) < SAME_M
+        same = bool(found) and float(np.linalg.norm(replan.goal_m - found[-1].goal_m)) < SAME_M
         if len(replan.trajectory_m) and not is_target and not same:
             found.append(replan)
     return found

@@ -16,12 +16,14 @@ from uavexp.export.map_voxels import spacing_m
 from uavexp.export.moments import PlanChange, plan_changes
 from uavexp.geometry import yaw_of
 from uavexp.log import TrialLog
+from uavexp.report.search_view import SAME_M, frontier_m
 from uavexp.store.stored_trial import StoredTrial
 
 MOST_ROWS = 1500  # of a path
 MOST_MOVER_ROWS = 400
 MOST_VOXELS = 120_000  # of a map; more are drawn at twice the edge
 MOST_PLAN_POINTS = 40
+MOST_FRONTIER = 1500  # cells
 _ABOVE_FLIGHT_M = 0.3  # the map is cut here at first, so that one looks into the rooms
 _VEHICLE_RADIUS_M = 0.2  # where the log does not tell
 
@@ -33,6 +35,7 @@ def page_data(trials: Sequence[StoredTrial]) -> Json:
     causes = dict.fromkeys(replan.cause for trial in trials for replan in trial.log.replans)
     world = trials[0].world
     start_m = trials[0].log.steps.position_m[0]
+    target_m = world.target_m if world is not None else np.full(3, np.inf)
     heights_m = np.concatenate([trial.log.steps.position_m[:, 2] for trial in trials])
     return {
         "end_s": max(float(trial.log.steps.time_s[-1]) for trial in trials),
@@ -40,13 +43,21 @@ def page_data(trials: Sequence[StoredTrial]) -> Json:
         "target": _numbers(world.target_m) if world is not None else None,
         "cut_m": round(float(heights_m.max()) + _ABOVE_FLIGHT_M, 1),
         "causes": {name: _cause(name) for name in causes},
-        "flights": [{"label": trial.label, **flight_data(trial.log)} for trial in trials],
+        "flights": [{"label": trial.label, **flight_data(trial.log, target_m)} for trial in trials],
     }
 
 
-def flight_data(log: TrialLog) -> Json:
-    """One flight: rows of its path, its plans, its map by the time each voxel was mapped, its movers."""
+def flight_data(log: TrialLog, target_m: Float) -> Json:
+    """One flight: rows of its path, its plans and goals, its map by the time it grew, its movers.
+
+    Args:
+        log: of the flight.
+        target_m: (3,) of its world; plans to elsewhere have a `goal`.
+    """
     steps, rows = log.steps, thinned(log.steps.time_s.size, MOST_ROWS)
+    height_m = float(steps.position_m[0, 2])
+    frontier = frontier_m(log, height_m)
+    frontier = frontier[thinned(len(frontier), MOST_FRONTIER)] if len(frontier) else frontier
     radius_m = log.limits.body_radius_m
     return {
         "headline": log.summary,
@@ -55,7 +66,8 @@ def flight_data(log: TrialLog) -> Json:
         "yaw": [round(yaw_of(q), 2) for q in steps.quaternion_wxyz[rows]],
         "clearance_m": _numbers(steps.clearance_m[rows]),
         "radius_m": round(float(radius_m), 3) if np.isfinite(radius_m) else _VEHICLE_RADIUS_M,
-        "plans": [_plan(change) for change in plan_changes(log)],
+        "plans": [_plan(change, target_m) for change in plan_changes(log)],
+        "frontier": _numbers(np.column_stack([frontier, np.full(len(frontier), height_m)]).ravel()),
         "contacts": [{"at": _numbers(item.position_m), "s": item.start_s} for item in log.contacts],
         "map": map_data(log),
         "movers": movers_data(log),
@@ -140,7 +152,8 @@ def _shows_a_face(index: Int) -> Any:
     return ~hidden
 
 
-def _plan(change: PlanChange) -> Json:
+def _plan(change: PlanChange, target_m: Float) -> Json:
+    is_target = float(np.linalg.norm(change.goal_m - target_m)) < SAME_M
     points_m: Float = change.trajectory_m
     if len(points_m):
         points_m = points_m[thinned(len(points_m), MOST_PLAN_POINTS)]
@@ -150,6 +163,7 @@ def _plan(change: PlanChange) -> Json:
         "cause": change.cause,
         "words": change.words,
         "at": _numbers(change.position_m),
+        "goal": None if is_target or not np.isfinite(change.goal_m).all() else _numbers(change.goal_m),
         "points": _numbers(points_m.ravel()),
     }
 

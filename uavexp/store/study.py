@@ -225,7 +225,7 @@ def _unsealed(file: Path) -> dict[str, Any]:
 
 
 def _read(file: Path, wanted: Callable[[str], bool] = lambda name: True) -> pd.DataFrame:
-    from pyarrow import ArrowException, parquet
+    from pyarrow import ArrowException, parquet, types
 
     try:
         with opened(file) as data, parquet.ParquetFile(data, page_checksum_verification=True) as table:
@@ -233,6 +233,9 @@ def _read(file: Path, wanted: Callable[[str], bool] = lambda name: True) -> pd.D
             if table.metadata.num_rows * len(columns) > _MOST_CELLS:
                 raise RecordError(f"{file}: {table.metadata.num_rows} rows, more than any study has")
             frame: pd.DataFrame = table.read(columns).to_pandas(ignore_metadata=True)
+            for item in table.schema_arrow:  # yes or no that not every world asks for: numbers, NaN where not
+                if types.is_boolean(item.type) and item.name in frame and frame[item.name].hasnans:
+                    frame[item.name] = frame[item.name].astype(float)
             return frame
     except (OSError, ArrowException, ValueError, MemoryError) as error:
         raise RecordError(f"{file}: cannot be read ({one_line(error)[:_MOST_WORDS]})") from error

@@ -24,7 +24,9 @@ from uavexp.explorer.volume.waves import (
     least_change,
     new_wave,
     reach,
+    reach_nearest,
     steps_on,
+    straight_cost,
     trace,
 )
 
@@ -88,6 +90,52 @@ def test_costs_equal_scipys_and_follow_every_change(seed: int) -> None:
                 level = least_change(wave, STEPS, changed)
                 if level < FAR - 1:
                     forget(wave, kind.reshape(-1), STEPS, price, level)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_nearest_places_are_those_of_scipys_costs(seed: int) -> None:
+    """As many groups as are enough have their nearest place, and whatever can still be the best is there."""
+    rng, size = np.random.default_rng(seed), int(np.prod(SHAPE))
+    kind, wave, number = random_kinds(rng), new_wave(size), np.zeros(size, np.int32)
+    source = int(np.ravel_multi_index((4, 4, 3), SHAPE))
+    costs = scipy_costs(kind, PRICES, source)
+    for groups, spare in ((3, FAR), (100, 150), (100, FAR)):
+        places, group = rng.integers(0, size, 60), np.sort(rng.integers(0, 20, 60))
+        places[:2], onward = source, rng.integers(0, 500, 60)
+        begin(wave, source)
+        found = reach_nearest(
+            wave, kind.reshape(-1), STEPS, PRICES, places, group, onward, number, groups, spare
+        )  # fmt: skip
+        passable = (PRICES.cell[kind.reshape(-1)[places]] > 0.0) | (places == source)
+        expected = np.where(passable, costs[places], np.inf)
+        np.testing.assert_array_equal(found[found < FAR], expected[found < FAR])
+        assert not number.any()
+        assert (found < FAR)[expected <= found[found < FAR].max() - 1].all()  # nearest first
+        if groups == 3:
+            assert len(np.unique(group[found < FAR])) >= 3  # more, where places share a cell
+        elif spare == FAR:
+            assert ((found < FAR) == np.isfinite(expected)).all()
+        else:
+            best = (expected + onward).min()
+            assert (found < FAR)[expected + onward <= best + spare].all()
+
+
+def test_a_straight_line_of_open_cells_costs_what_the_wave_finds_and_no_other_line_anything() -> None:
+    rng, size = np.random.default_rng(5), int(np.prod(SHAPE))
+    kind, wave = np.zeros(SHAPE, np.uint8), new_wave(size)
+    kind[1:-1, 1:-1, 1:-1] = OPEN
+    kind[4, 3:, 2:4] = NARROW
+    inner, told = np.flatnonzero(kind.reshape(-1) == OPEN), 0
+    for _ in range(200):
+        start, end = rng.choice(inner, 2)
+        begin(wave, start)
+        cost = straight_cost(kind.reshape(-1), SHAPE, WIDE, start, end)
+        if cost < FAR:
+            assert cost == reach(wave, kind.reshape(-1), STEPS, WIDE, end, FAR)
+        told += cost < FAR
+    assert 50 < told < 200
+    ends = [int(np.ravel_multi_index(cell, SHAPE)) for cell in ((3, 5, 2), (5, 5, 2))]
+    assert straight_cost(kind.reshape(-1), SHAPE, WIDE, *ends) == FAR
 
 
 def test_no_way_that_costs_more_than_asked_for_is_found_and_it_is_later() -> None:

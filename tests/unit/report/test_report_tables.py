@@ -372,6 +372,17 @@ def test_systems_that_were_not_flown_stand_below_with_what_is_printed_of_them(tr
     assert len(plain.rows) == 3
 
 
+def test_a_table_of_some_scenes_is_that_of_their_trials_alone(trials: pd.DataFrame) -> None:
+    scene = trials["scene"].iloc[0]
+    metrics = ["success", "replans"]
+    alone = {"tables": [{"by_arm": {"metrics": metrics, "name": "a"}}]}
+    for rows, patterns in ((trials[trials["scene"] == scene], [scene]), (trials, ["*"])):
+        some = {"tables": [{"by_arm": {"metrics": metrics, "name": "a", "scenes": patterns}}]}
+        assert report_of(trials, some).tables[0].rows == report_of(rows, alone).tables[0].rows
+    none = {"tables": [{"by_arm": {"metrics": metrics, "scenes": ["nowhere"]}}]}
+    assert report_of(trials, none).tables == ()
+
+
 BEATS = "MCR beats {}: as much success and clearance with fewer replans"
 
 

@@ -72,7 +72,8 @@ def test_the_page_fetches_nothing_and_no_name_can_end_its_script(study_page) -> 
 
 def test_the_page_shows_the_flight_that_was_flown() -> None:
     log = read_trial(FLOWN).log
-    data = flight_data.flight_data(log)
+    target_m = log.replans[-1].goal_m
+    data = flight_data.flight_data(log, target_m)
     path_m = np.array(data["path"]).reshape(-1, 3)
     rows = np.searchsorted(log.steps.time_s, np.array(data["time_s"]) - 1e-6)
     np.testing.assert_allclose(path_m, log.steps.position_m[rows], atol=5.1e-4)
@@ -80,6 +81,10 @@ def test_the_page_shows_the_flight_that_was_flown() -> None:
     assert [plan["cause"] for plan in data["plans"]] == [replan.cause for replan in log.replans]
     for plan, replan in zip(data["plans"], log.replans, strict=True):
         assert plan["s"] == pytest.approx(replan.time_s, abs=1e-3)
+        if plan["goal"] is None:
+            assert np.linalg.norm(replan.goal_m - target_m) < 0.3
+        else:
+            np.testing.assert_allclose(plan["goal"], replan.goal_m, atol=1e-3)
         if len(replan.trajectory_m):
             np.testing.assert_allclose(plan["points"][-3:], replan.trajectory_m[-1], atol=1e-3)
 

@@ -22,6 +22,7 @@ from uavexp.check.promise import same
 from uavexp.errors import RecordError
 from uavexp.log import Contact, Replan, TrialLog
 from uavexp.store.logs import arrays_digest, flat, log_arrays, nested, pack, read_log
+from uavexp.store.parts import check_table
 from uavexp.store.records import (
     canonical_json,
     cell_digest,
@@ -33,7 +34,7 @@ from uavexp.store.records import (
     write_atomically,
     write_text,
 )
-from uavexp.store.study import Study, StudyCell, collect, read_study, study_text
+from uavexp.store.study import Study, StudyCell, _read, collect, read_study, study_text
 from uavexp.store.table import FIRST, replan_rows, row_of, write_table
 from uavexp.store.worlds import read_world, world_bytes
 from uavexp.types import Outcome, PlanStatus, World
@@ -409,6 +410,17 @@ def test_the_table_has_its_columns_in_order_and_its_pages_checked(tmp_path: Path
     assert table["p_a_b"].to_pylist() == ["[1,2]", "text"]
     assert table["success"].to_pylist() == [True, False]
     assert table["jerk"].to_pylist() == [0.5, None]
+
+
+def test_what_only_some_worlds_ask_for_comes_back_as_numbers(tmp_path: Path) -> None:
+    """A study of BARN's worlds and others could not be reported: `barn_collided` is no or nothing there."""
+    trial = {"trial": "a", "seed": 0, "outcome": "reached", "success": True, "completion_time_s": 1.0}
+    rows = [{**trial, "barn_collided": asked} for asked in (None, False, True)]
+    write_table(tmp_path / "trials.parquet", rows)
+    table = _read(tmp_path / "trials.parquet")
+    check_table(tmp_path / "trials.parquet", table, {})
+    np.testing.assert_array_equal(table["barn_collided"], [np.nan, 0.0, 1.0])
+    assert table["success"].dtype == bool
 
 
 def test_a_flipped_bit_in_the_table_is_noticed(tmp_path: Path) -> None:

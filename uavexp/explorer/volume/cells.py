@@ -145,27 +145,30 @@ def _still_wanted(distance: Float32, state: UInt8, voxel_m: float, size: int, fi
 
 
 @nb.njit(cache=True)
-def _frontier(kind: UInt8, wanted: Bool, looked: UInt8, enough: int, faces: Int) -> Int:
-    """Cells (F,) that are wanted, were looked at less than `enough` times in vain, and lie beside a seen one.
+def _mark_frontier(kind: UInt8, wanted: Bool, columns: Bool, frontier: Bool) -> None:
+    """Mark the cells that are wanted and lie beside a seen one, in columns (I, J) and those next to them.
 
     Args:
-        kind: (N,) flat.
-        wanted: (N,).
-        looked: (N,).
-        enough: times.
-        faces: (6,) offsets to the neighbours across a face.
+        kind: (I, J, K) margin included.
+        wanted: the same.
+        columns: without margin.
+        frontier: as `kind`, is written.
     """
-    found, count = np.empty(kind.shape[0], np.int64), 0
-    for at in range(kind.shape[0]):
-        if not wanted[at] or looked[at] >= enough:
-            continue
-        for offset in faces:
-            near = kind[at + offset]
-            if near in (EDGE, OPEN, NARROW):
-                found[count] = at
-                count += 1
-                break
-    return found[:count].copy()
+    rows, across = columns.shape
+    for i in range(rows):
+        for j in range(across):
+            if not columns[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2].any():
+                continue
+            x, y = i + 1, j + 1
+            for z in range(1, kind.shape[2] - 1):
+                beside = False
+                if wanted[x, y, z]:
+                    for near in (
+                        kind[x - 1, y, z], kind[x + 1, y, z], kind[x, y - 1, z], kind[x, y + 1, z],
+                        kind[x, y, z - 1], kind[x, y, z + 1],
+                    ):  # fmt: skip
+                        beside |= near in (EDGE, OPEN, NARROW)
+                frontier[x, y, z] = beside
 
 
 class Cells:
@@ -196,7 +199,7 @@ class Cells:
         self.wanted: Bool = np.zeros_like(self.kind, dtype=np.bool_)
         self.looked: UInt8 = np.zeros_like(self.kind)
         self.steps: Steps = steps_on(self.shape)
-        self._faces: Int = self.steps.offset[self.steps.length == self.steps.length.min()]
+        self._frontier: Bool = np.zeros_like(self.wanted)
         low = np.ceil((bounds_m[0] - field.origin_m) / self.cell_m - 0.5 - 1e-6)
         high = np.floor((bounds_m[1] - field.origin_m) / self.cell_m - 0.5 + 1e-6) + 1
         self._inside = np.clip(np.stack([low, high]), 0, np.array(self.shape) - 2).astype(np.int64)
@@ -218,6 +221,7 @@ class Cells:
             field.distance, field.state, field.voxel_size_m, self.size, columns, self._inside, self._body,
             *shaped, self._changes,
         )  # fmt: skip
+        _mark_frontier(*shaped, columns, self._frontier.reshape(self.shape))
         return self._changes[:count].copy()
 
     def still_wanted(self, cells: Int) -> Bool:
@@ -230,8 +234,8 @@ class Cells:
 
     def frontier(self, enough: int) -> Int:
         """Frontier cells (F,), ascending; those looked at so often in vain are none any more."""
-        found: Int = _frontier(self.kind, self.wanted, self.looked, enough, self._faces)
-        return found
+        found = np.flatnonzero(self._frontier)
+        return found[self.looked[found] < enough]
 
     def index(self, cells: Int) -> Int:
         """Indices (F, 3) of flat cells (F,)."""

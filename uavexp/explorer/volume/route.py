@@ -19,15 +19,18 @@ from uavexp.explorer.volume.waves import (
     least_change,
     new_wave,
     reach_all,
+    reach_nearest,
+    straight_cost,
     trace,
 )
 from uavexp.inspection.tour import open_tour
 
 _NEAREST = 6  # places to which ways are sought; those to farther ones lead through these
-_LONGER, _FARTHER_M = 1.5, 2.0  # ways between places are sought up to so many straight ones and so far more
+_LONGER, _FARTHER_M = 1.3, 1.5  # ways between places are sought up to so many straight ones and so far more
 _KICKS_PER_PLACE = 1
 PLACES = 12  # that a tour visits, the nearest; farther ones wait for the next
 _MEMORY = 20_000  # pairs
+_MEASURED = 1  # places from which ways are sought at one time; those of others wait for the next choice
 _NARROW_PRICE = 3.0
 # prices of the kinds of cells on ways over what was seen: without narrow places, with them, and with
 # places of which not all around was seen, as that of the start
@@ -66,11 +69,13 @@ class Ways:
     _own: Wave = field(init=False, repr=False)
     _other: Wave = field(init=False, repr=False)
     _beyond: Wave = field(init=False, repr=False)
+    _number: Int32 = field(init=False, repr=False)
     _between: dict[tuple[int, int], float] = field(init=False, repr=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         size = self.cells.kind.size
         self._own, self._other, self._beyond = new_wave(size), new_wave(size), new_wave(size)
+        self._number = np.zeros(size, np.int32)
         if self.target is not None:
             begin(self._beyond, self.target)
 
@@ -87,10 +92,30 @@ class Ways:
         self._vehicle, self._known = vehicle, known
         begin(self._own, vehicle)
 
-    def there_m(self, places: Int) -> Float:
-        """Lengths (P,) of the ways from the vehicle to cells (P,) over what was seen; inf: there is none."""
+    def there_m(self, places: Int, most_m: float = np.inf) -> Float:
+        """Lengths (P,) of the ways from the vehicle to cells (P,) over seen cells; inf: none so short."""
         cells = self.cells
-        cost = reach_all(self._own, cells.kind, cells.steps, self._known, places, FAR)
+        most = int(min(most_m / cells.cell_m * UNIT, FAR))
+        cost = reach_all(self._own, cells.kind, cells.steps, self._known, places, most)
+        return np.where(places == self._vehicle, 0.0, _metres(cost, cells.cell_m))
+
+    def nearest_m(self, places: Int, group: Int, onward_m: Float, groups: int, spare_m: float) -> Float:
+        """Lengths (P,) of the ways from the vehicle to the nearest places; inf to all others.
+
+        Args:
+            places: (P,) cells.
+            group: (P,) that each belongs to, from 0 on.
+            onward_m: (P,) what lies behind each.
+            groups: so many with a place are enough.
+            spare_m: places are not sought that are worse than the best by more.
+        """
+        cells = self.cells
+        unit = UNIT / cells.cell_m
+        onward = np.minimum(onward_m * unit, FAR).astype(np.int64)
+        cost = reach_nearest(
+            self._own, cells.kind, cells.steps, self._known, places, group, onward, self._number, groups,
+            int(min(spare_m * unit, FAR)),
+        )  # fmt: skip
         return np.where(places == self._vehicle, 0.0, _metres(cost, cells.cell_m))
 
     def way(self, cell: int) -> Int:
@@ -127,18 +152,32 @@ class Ways:
         straight = np.linalg.norm(middle[:, None] - middle, axis=2)
         if len(self._between) > _MEMORY:
             self._between.clear()
+        unknown: list[tuple[int, Int]] = []
         for a in range(count):
             near = np.argsort(straight[a], kind="stable")[1 : _NEAREST + 1]
-            missing = [int(b) for b in near if (int(places[a]), int(places[b])) not in self._between]
+            missing = [int(b) for b in near if not self._knows(int(places[a]), int(places[b]))]
             if missing:  # two places may share a cell
-                most_m = np.minimum(over[a, missing], _LONGER * straight[a, missing] + _FARTHER_M)
-                self._measure(int(places[a]), places[missing], most_m)
-            for b in near:
-                over[a, b] = over[b, a] = min(over[a, b], self._between[int(places[a]), int(places[b])])
+                unknown.append((a, np.array(missing)))
+        for a, ends in unknown[:_MEASURED]:
+            most_m = np.minimum(over[a, ends], _LONGER * straight[a, ends] + _FARTHER_M)
+            self._measure(int(places[a]), places[ends], most_m)
+        for a, b in np.argwhere(~np.eye(count, dtype=np.bool_)):
+            known_m = self._between.get((int(places[a]), int(places[b])), np.inf)
+            over[a, b] = over[b, a] = min(over[a, b], known_m)
         for via in range(count):  # Floyd and Warshall
             np.minimum(over, over[:, via, None] + over[via], out=over)
         np.fill_diagonal(over, 0.0)
         return np.asarray(np.minimum(over, over.T))
+
+    def _knows(self, start: int, end: int) -> bool:
+        """Whether the length of the way between two places is known, or is that of a straight one."""
+        if (start, end) in self._between:
+            return True
+        cells = self.cells
+        cost: int = straight_cost(cells.kind, cells.shape, self._known, start, end)
+        if cost < FAR:
+            self._between[start, end] = self._between[end, start] = cost * cells.cell_m / UNIT
+        return cost < FAR
 
     def _measure(self, start: int, ends: Int, most_m: Float) -> None:
         """Note the lengths of ways from one place to others, as far as they are no longer than `most_m`."""

@@ -16,7 +16,6 @@ from uavexp.explorer.volume.viewpoints import Cluster, Viewpoints
 from uavexp.explorer.volume.waves import Prices
 
 _LEAST_LEG_M = 0.8
-_AT_ONCE = 8  # clusters that are asked for at once
 _LEG_DONE_M = 1.2  # so near to the end of a leg the next one is flown to, before the vehicle brakes
 
 
@@ -65,45 +64,36 @@ class Space:
         return float(self.ways.there_m(np.array([cell]))[0])
 
     def candidates(
-        self, clusters: Sequence[Cluster], is_aside: Callable[[Float], Bool], here_m: Float, spare_m: float
+        self, clusters: Sequence[Cluster], is_aside: Callable[[Float], Bool], spare_m: float
     ) -> Candidates:
         """The nearest place of each cluster that has one which is not set aside and can be reached.
 
-        Clusters are asked in the order of straight ways, as long as one may still be the best, or better
-        than that by less than `spare_m`; without a target, until there are enough for a tour.
+        Clusters of which none can be better than the best, or worse by less than `spare_m`, are left out;
+        without a target, those beyond what is enough for a tour.
         """
         seen = [cluster for cluster in clusters if len(cluster.eyes)]
-        onward_m = self._onward_m(seen)
-        straight_m = np.array([np.linalg.norm(item.eyes_m - here_m, axis=1).min() for item in seen])
-        order = np.argsort(straight_m + onward_m, kind="stable")
-        found: list[tuple[Cluster, int, float, float]] = []
-        best_m = np.inf
-        for begin in range(0, len(order), _AT_ONCE):
-            group = order[begin : begin + _AT_ONCE]
-            enough = len(found) >= PLACES if self.ways.target is None else False
-            if enough or straight_m[group[0]] + onward_m[group[0]] > best_m + spare_m:
-                break
-            for n, eye, there_m in self._nearest([seen[n] for n in group], is_aside):
-                found.append((seen[group[n]], eye, there_m, onward_m[group[n]]))
-                best_m = min(best_m, there_m + onward_m[group[n]]) if self.ways.target is not None else best_m
+        counts = [len(cluster.eyes) for cluster in seen]
+        group, onward_m = np.repeat(np.arange(len(seen)), counts), self._onward_m(seen)
+        eyes_m = np.concatenate([np.zeros((0, 3)), *(cluster.eyes_m for cluster in seen)])
+        open_ = ~is_aside(eyes_m) & np.isfinite(onward_m)[group]
+        there_m = np.full(len(group), np.inf)
+        if open_.any():
+            places = np.concatenate([cluster.eyes for cluster in seen])[open_]
+            tours = self.ways.target is None
+            there_m[open_] = self.ways.nearest_m(
+                places, group[open_], onward_m[group[open_]], PLACES if tours else len(seen) + 1,
+                np.inf if tours else spare_m,
+            )  # fmt: skip
+        parts = np.split(there_m, np.cumsum(counts)[:-1]) if seen else []
+        found = [n for n, part in enumerate(parts) if np.isfinite(part.min())]
+        eye = [int(np.argmin(parts[n])) for n in found]
         return Candidates(
-            [item[0] for item in found],
-            np.array([item[1] for item in found], dtype=np.int64),
-            np.array([item[0].eyes_m[item[1]] for item in found]).reshape(-1, 3),
-            np.array([item[2] for item in found]),
-            np.array([item[3] for item in found]),
+            [seen[n] for n in found],
+            np.array(eye, dtype=np.int64),
+            np.array([seen[n].eyes_m[e] for n, e in zip(found, eye, strict=True)]).reshape(-1, 3),
+            np.array([parts[n].min() for n in found]),
+            onward_m[found],
         )
-
-    def _nearest(
-        self, clusters: Sequence[Cluster], is_aside: Callable[[Float], Bool]
-    ) -> list[tuple[int, int, float]]:
-        """Of clusters that have a place within reach: number, place and length of the way there."""
-        lengths_m = self.ways.there_m(np.concatenate([cluster.eyes for cluster in clusters]))
-        aside = is_aside(np.concatenate([cluster.eyes_m for cluster in clusters]))
-        ends = np.cumsum([len(cluster.eyes) for cluster in clusters])[:-1]
-        parts = np.split(np.where(aside, np.inf, lengths_m), ends)
-        nearest = [(n, int(np.argmin(part)), float(part.min())) for n, part in enumerate(parts)]
-        return [item for item in nearest if np.isfinite(item[2])]
 
     def _onward_m(self, clusters: Sequence[Cluster]) -> Float:
         """Length (N,) from the first place of clusters to what it shows and on to the target."""
@@ -114,9 +104,9 @@ class Space:
         look_m = np.linalg.norm(self.cells.centre_m(middle) - first_m, axis=1)
         return np.asarray(look_m + self.ways.beyond_m(middle))
 
-    def leads_to(self, place_m: Float) -> bool:
-        """Whether a way over what was seen leads to a place (3,)."""
-        return bool(np.isfinite(self.ways.there_m(np.array([self.cell_of(place_m)]))[0]))
+    def leads_to(self, place_m: Float, most_m: float) -> bool:
+        """Whether a way over what was seen leads to a place (3,), no longer than that."""
+        return bool(np.isfinite(self.ways.there_m(np.array([self.cell_of(place_m)]), most_m)[0]))
 
     def leg_m(self, from_m: Float, to_m: Float, before_m: Float | None) -> Float:
         """Where (3,) the next leg to a place ends; the one before, while it holds."""

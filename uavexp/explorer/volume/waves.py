@@ -10,17 +10,19 @@ A wave is kept while cells change (`forget`): up to the least cost that a change
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numba as nb
 import numpy as np
 
-from uavexp.arrays import Float, Int, Int32, UInt8
+from uavexp.arrays import Bool, Float, Int, Int32, UInt8
 from uavexp.memory import blank
 
 FAR = 2**31 - 1
 UNIT = 100  # a straight step between cells of the least price
 MOST_PRICE = 5.0
+_FACE, _CORNER = 141, 173  # steps across an edge and a corner
 _BUCKETS = 1024  # > the longest step
 _RING = _BUCKETS - 1
 _NOW, _WAITING, _LEFT = 0, 1, 2
@@ -171,6 +173,81 @@ def reach_all(wave: Wave, kind: UInt8, steps: Steps, price: Prices, goals: Int, 
     for n in range(goals.shape[0]):
         cost[n] = reach(wave, kind, steps, price, goals[n], most)
     return cost
+
+
+@nb.njit(cache=True, inline="always")
+def _settle(p: int, there: int, group: Int, onward: Int, found: Int, reached: Bool, tally: Int) -> None:
+    """Take note of the cost of the way to place number p."""
+    if found[p] == FAR:
+        tally[0] += not reached[group[p]]
+        found[p], reached[group[p]], tally[1] = there, True, min(tally[1], there + onward[p])
+
+
+@nb.njit(cache=True)
+def reach_nearest(
+    wave: Wave, kind: UInt8, steps: Steps, price: Prices, places: Int, group: Int, onward: Int, number: Int32,
+    groups: int, spare: int,
+) -> Int:  # fmt: skip
+    """Costs (P,) of ways to the nearest places; FAR to those where the wave has not been when it stops.
+
+    It stops when so many groups have a place, and when no place can still be less than `spare` worse, with
+    what lies behind it, than the best.
+
+    Args:
+        wave: is let spread so far.
+        kind: (N,) of each cell, margin included.
+        steps: on the grid.
+        price: of each kind.
+        places: (P,) cells.
+        group: (P,) that each belongs to, from 0 on.
+        onward: (P,) cost from each to the end of all.
+        number: (N,) zeros; is left so.
+        groups: that are enough.
+        spare: cost.
+    """
+    cost, clock = wave.cost, wave.clock
+    found, beside = np.full(places.shape[0], FAR), np.empty(places.shape[0], np.int64)
+    tally = np.array([0, FAR])  # groups that have a place, cost over the best one
+    reached, least, now = np.zeros(places.shape[0], np.bool_), onward.min(), clock[_NOW]
+    for p in range(places.shape[0]):
+        beside[p], number[places[p]] = number[places[p]] - 1, p + 1  # places may share a cell
+        if cost[places[p]] <= now:
+            _settle(p, cost[places[p]], group, onward, found, reached, tally)
+    while clock[_WAITING] > 0 and tally[0] < groups and now + least <= tally[1] + spare:
+        at = wave.head[now & _RING]
+        if at < 0:
+            now += 1
+            continue
+        _remove(wave, at)
+        wave.order[clock[_LEFT]] = at
+        clock[_LEFT] += 1
+        p = number[at] - 1
+        while p >= 0:
+            _settle(p, now, group, onward, found, reached, tally)
+            p = beside[p]
+        _spread(wave, kind, steps, price, at)
+    clock[_NOW] = now
+    for p in range(places.shape[0]):
+        number[places[p]] = 0
+    return found
+
+
+@nb.njit(cache=True)
+def straight_cost(kind: UInt8, shape: tuple[int, int, int], price: Prices, start: int, end: int) -> int:
+    """Cost of the least steps between two cells where cells of the least price fill the line; else FAR."""
+    across, tall = shape[1] * shape[2], shape[2]
+    x, y, z = start // across, start // tall % shape[1], start % tall
+    dx, dy, dz = end // across - x, end // tall % shape[1] - y, end % tall - z
+    longest = max(abs(dx), abs(dy), abs(dz))
+    for n in range(longest + 1):
+        share = n / max(longest, 1)
+        i, j = math.floor(x + share * dx + 0.5), math.floor(y + share * dy + 0.5)
+        at = i * across + j * tall + math.floor(z + share * dz + 0.5)
+        if price.cell[kind[at]] != 1.0:
+            return FAR
+    shortest = min(abs(dx), abs(dy), abs(dz))
+    middle = abs(dx) + abs(dy) + abs(dz) - longest - shortest
+    return UNIT * (longest - middle) + _FACE * (middle - shortest) + _CORNER * shortest
 
 
 @nb.njit(cache=True)

@@ -87,6 +87,22 @@
     ];
   }
 
+  // goals in their order, and the frontier that the flight left at the height of its start
+  function searchTraces(flight) {
+    const count = flight.goals[0].length, found = [];
+    if (count) {
+      found.push({ ...along(flight.goals), mode: "markers+text", name: `goals in their order (${count})`,
+        text: flight.goals[0].map((_, n) => `${n + 1}`), textposition: "top center", hoverinfo: "text",
+        textfont: { color: "#882255", size: 10 },
+        marker: { color: "#ffffff", symbol: "circle", size: 5, line: { color: "#882255", width: 2 } } });
+    }
+    if (flight.frontier[0].length) {
+      found.push({ ...along(flight.frontier), mode: "markers", name: "frontier at the end", hoverinfo: "name",
+        marker: { color: "#aa4499", symbol: "circle", size: 2 } });
+    }
+    return found;
+  }
+
   function traces(flight) {
     const cut = Number(slider.value);
     const mesh = surface(flight.map, cut);
@@ -101,6 +117,7 @@
         line: { color: ink, width: 3, dash: "dash" } },
       { ...along(flight.flown), mode: "lines", name: "flown", hoverinfo: "text", text: flight.hover,
         line: { color: flight.colour, width: 7 } },
+      ...searchTraces(flight),
       ...moverTraces(flight.movers),
       ...replanTraces(flight.replans),
       { ...along(flight.contacts), mode: "markers", name: `contact (${flight.contacts[0].length})`,

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from fnmatch import fnmatchcase
 
 import numpy as np
 
 from uavexp.arrays import Bool, Float
 from uavexp.metrics.metric import Metric
 from uavexp.report import number_format
-from uavexp.report.comparison import Panel, estimate
+from uavexp.report.comparison import SCENE, Panel, estimate, panel_of
 from uavexp.report.labels import CLEARANCE, RATE, REPLANS
 from uavexp.report.printed import Printed
-from uavexp.report.results import FAILED, INTERVALS, Results
+from uavexp.report.results import ARM, FAILED, INTERVALS, Results
 from uavexp.report.tables.base import Table
 
 _JUDGED = (RATE, CLEARANCE, REPLANS)
@@ -32,7 +33,8 @@ def table(
     notes: Sequence[str] = (),
     front: bool = False,
     printed: bool = False,
-) -> Table:
+    scenes: Sequence[str] = (),
+) -> Table | None:
     """How each arm did.
 
     Args:
@@ -43,8 +45,12 @@ def table(
         notes: sentences below it.
         front: with a column that says who is on the front of success, clearance and replans.
         printed: with a row for each arm that is in `reference.csv` alone: a system that was not flown here.
+        scenes: patterns of the names of scenes (`*` any letters) that it tells of; none: of all. No table
+            where none of them was flown.
     """
-    panel = results.panel
+    panel = _in_scenes(results, scenes)
+    if panel is None:
+        return None
     shown = results.occurring(metrics)
     rows = [
         (
@@ -67,6 +73,15 @@ def table(
     )
     made = _with_front(made, panel) if front else made
     return _with_printed(made, results, shown) if printed else made
+
+
+def _in_scenes(results: Results, patterns: Sequence[str]) -> Panel | None:
+    """The trials in scenes with such names; None: there are none."""
+    if not patterns:
+        return results.panel
+    kept = [scene for scene in results.scenes if any(fnmatchcase(scene, pattern) for pattern in patterns)]
+    trials = results.trials[results.trials[SCENE].isin(kept)]
+    return panel_of(trials, ARM, results.arms, together=results.shown) if kept else None
 
 
 def _with_printed(made: Table, results: Results, shown: Sequence[Metric]) -> Table:

@@ -3,7 +3,7 @@
   const data = JSON.parse(document.getElementById("flights").textContent);
   const byId = (name) => document.getElementById(name);
   const [play, time, speed, cut] = ["play", "time", "speed", "cut"].map(byId);
-  const BLUE = "#0072B2", RED = "#D55E00";
+  const BLUE = "#0072B2", RED = "#D55E00", WINE = "#882255", PURPLE = "#AA4499";
   let now = data.end_s, playing = false, asked = false;
 
   async function unpacked(text) {
@@ -116,6 +116,25 @@
     pen.fillText(text, point[0] + 12, point[1] - 8);
   }
 
+  // goals so far, the last with a line to where it was chosen, and the frontier that the flight left
+  function drawSearch(pen, flight, taken, seen) {
+    const goals = taken.filter((plan) => plan.goal);
+    for (const plan of goals) {
+      const last = plan === taken[taken.length - 1], goal = seen(plan.goal);
+      if (!goal) continue;
+      pen.globalAlpha = last ? 1 : 0.45;
+      if (last) line(pen, [seen(plan.at), goal], WINE, 1.2, [2, 4]);
+      marks.draw(pen, ...goal, last ? 7 : 4, "o", "#fff", WINE);
+      pen.globalAlpha = 1;
+    }
+    if (now < flight.time_s[flight.time_s.length - 1]) return;
+    pen.fillStyle = PURPLE;
+    for (let n = 0; n < flight.frontier.length / 3; n++) {
+      const cell = seen(pointAt(flight.frontier, n));
+      if (cell) pen.fillRect(cell[0] - 1, cell[1] - 1, 2.5, 2.5);
+    }
+  }
+
   function drawLines(view, matrix, row) {
     const { flight, flat } = view, { width, height, ratio } = sized(flat), pen = flat.getContext("2d");
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
@@ -134,6 +153,7 @@
       line(pen, points, colour, last ? 2.5 : 1, last ? [7, 5] : []);
       pen.globalAlpha = 1;
     }
+    drawSearch(pen, flight, taken, seen);
     line(pen, flown, "#fff", 5.5);
     line(pen, flown, BLUE, 3);
     const many = flight.plans.length > 40;
@@ -238,6 +258,12 @@
     entry("flown", (pen) => line(pen, [[1, 10], [19, 10]], BLUE, 3));
     entry("plan being flown, in the colour of its cause", (pen) => line(pen, [[0, 10], [20, 10]], "#606060", 2.5, [6, 4]));
     entry("mapped as occupied, lighter is higher", (pen) => { pen.fillStyle = "#8a9aac"; pen.fillRect(3, 3, 14, 14); });
+    if (data.flights.some((flight) => flight.plans.some((plan) => plan.goal))) {
+      entry("goal short of the target, the last with a line to where it was chosen", (pen) => marks.draw(pen, 10, 10, 7, "o", "#fff", WINE));
+    }
+    if (data.flights.some((flight) => flight.frontier.length)) {
+      entry("frontier at the end, at the height of the start", (pen) => { pen.fillStyle = PURPLE; pen.fillRect(8, 8, 4, 4); });
+    }
     if (data.flights.some((flight) => flight.movers.shape.length)) {
       entry("moving obstacle", (pen) => marks.draw(pen, 10, 10, 8, "o", "#882255"));
     }
