@@ -53,7 +53,7 @@ from uavexp.planner.mpc.guide import Guide, StaticPlanner, still_holds
 from uavexp.planner.mpc.horizon import horizon_model
 from uavexp.planner.shape.static_spline import StaticSpline
 from uavexp.planner.shape.stop_first import summed
-from uavexp.types import Limits, PlanRequest, PlanResult, PlanStatus, Tracks
+from uavexp.types import Limits, PlanRequest, PlanResult, PlanStatus, Squeeze, Tracks
 
 
 @option
@@ -150,15 +150,22 @@ class BsplineMpc:
         follower = self._follower
         if follower is None:
             raise RuntimeError("plan() needs reset() first")
-        result, constraints = self._plan(request, follower), follower.static.constraints
-        narrow = constraints.narrowed(result, request, self.narrow_clearance_m, self.narrow_speed_mps)
-        if narrow is None:
+        result, squeeze = self._plan(request, follower), request.squeeze
+        narrow = Squeeze(clearance_m=self.narrow_clearance_m, speed_mps=self.narrow_speed_mps)
+        result = self._narrowed(result, request, follower, narrow, "a narrow place")
+        return result if squeeze is None else self._narrowed(result, request, follower, squeeze, "a squeeze")
+
+    def _narrowed(
+        self, result: PlanResult, request: PlanRequest, follower: Follower, through: Squeeze, where: str
+    ) -> PlanResult:
+        """The result, unless a lesser clearance at a lesser speed finds a way that it lacks."""
+        constraints = follower.static.constraints
+        least = constraints.narrowed(result, request, through.clearance_m, through.speed_mps)
+        if least is None:
             return result
-        static = replace(follower.static, constraints=narrow)
-        slow = replace(follower.limits, max_speed_mps=narrow.limits.max_speed_mps)
-        return summed(
-            result, self._plan(request, replace(follower, static=static, limits=slow)), "a narrow place"
-        )
+        static = replace(follower.static, constraints=least)
+        slow = replace(follower.limits, max_speed_mps=least.limits.max_speed_mps)
+        return summed(result, self._plan(request, replace(follower, static=static, limits=slow)), where)
 
     def _plan(self, request: PlanRequest, follower: Follower) -> PlanResult:
         """`plan` by this follower."""

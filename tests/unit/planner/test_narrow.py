@@ -14,7 +14,7 @@ from uavexp.check.requests import ask
 from uavexp.explorer.frontier import Frontier
 from uavexp.field import DistanceField
 from uavexp.trajectory import evaluate
-from uavexp.types import PlanStatus
+from uavexp.types import PlanStatus, Squeeze
 
 NARROW_M, SLOW_MPS = 0.22, 1.0
 START, TARGET = np.array([1.05, 2.05, 1.05]), np.array([6.05, 2.05, 1.05])
@@ -57,6 +57,18 @@ def test_a_door_that_is_wide_enough_is_passed_as_ever_and_one_narrower_still_not
     times_s = np.linspace(wide.trajectory.start_s, wide.trajectory.end_s, 800)
     assert np.linalg.norm(evaluate(wide.trajectory, times_s)[1], axis=1).max() > 1.5
     assert planner("min_acc").plan(ask(doorway(0.2), START, TARGET)).status is not PlanStatus.OK
+
+
+@pytest.mark.parametrize("name", ["min_acc", "bspline_qp", "bspline_mpc"])
+def test_a_squeeze_passes_where_a_narrow_place_is_not_narrow_enough(name: str) -> None:
+    request = ask(doorway(0.3), START, TARGET)
+    blocked = planner(name, narrow_clearance_m=0.0)
+    assert blocked.plan(request).status is not PlanStatus.OK
+    through = replace(request, squeeze=Squeeze(clearance_m=NARROW_M, speed_mps=0.5))
+    result = blocked.plan(through)
+    assert result.trajectory is not None, result.reason
+    times_s = np.linspace(result.trajectory.start_s, result.trajectory.end_s, 800)
+    assert np.linalg.norm(evaluate(result.trajectory, times_s)[1], axis=1).max() <= 0.5 * 1.001
 
 
 def test_who_is_fast_is_not_led_into_a_narrow_place() -> None:
