@@ -25,7 +25,7 @@ all that is mapped as long as the assumptions hold.
 what is kept by the planner beyond it (a plate thinner than half a voxel, seen edge-on, may be missing
 from `mapping=dense`; `dense_thin` has it), and nothing moves (movers are the planner's and the trigger's
 to avoid); the vehicle is on its reference but for an error below the same margin and what is left
-between the body and its turning circle: half of the time it is below 0.02 m, at most 0.05 to 0.13 m in
+between the body and its turning circle: half of the time it is below 0.02 m, at most 0.04 to 0.23 m in
 flights at 2.5 and 5 m/s (column `tracking_error_max_m`). It is counted, not proved: the pace falls to 0
 as the error, or what the present difference of velocity makes of it, comes to the room beside the way,
 and to `stop_error_m` anywhere; and no pace turns the acceleration faster than the vehicle follows, but
