@@ -23,7 +23,7 @@ from uavexp.trajectory import Trajectory
 from uavexp.trigger.base import TriggerPolicy
 from uavexp.types import Decision, Limits, Observation
 
-ARMS = ("strategy=mcr", "strategy=mcr_adaptive", "strategy=gain")
+ARMS = ("strategy=mcr", "strategy=mcr_adaptive", "strategy=gain", "strategy=learned")
 WORLDS = ("random_columns", "warehouse", "corridors", "rooms")
 
 

@@ -10,6 +10,7 @@ import pytest
 
 from uavexp.check.hall import FLOWN, LIMITS, STRAIGHT, goal_at, observe, room
 from uavexp.field import DistanceField
+from uavexp.trajectory import Trajectory
 from uavexp.trigger.gain import Gain, chance_of_stop, places_aside
 from uavexp.types import Goal, Observation
 
@@ -91,6 +92,18 @@ class TestTime:
     def test_a_goal_behind_is_lost_twice_the_way_flown(self) -> None:
         behind = observe(FREE, time_s=2.0, goal=goal(5.5), best=goal(0.2))
         assert score_s(behind, horizon_s=1.2) == pytest.approx(2.4)
+
+    def test_at_twice_the_speed_the_same_time_is_lost_behind(self) -> None:
+        faster = Trajectory(
+            breaks_s=STRAIGHT.breaks_s,
+            coefficients=STRAIGHT.coefficients * np.array([1.0, 2.0])[None, :, None],
+            at_rest=False,
+        )
+        policy = Gain(cost_s=1.0, horizon_s=1.2)
+        policy.reset(LIMITS)
+        policy.planned(faster, FREE)
+        behind = observe(FREE, time_s=2.0, goal=goal(5.5), best=goal(0.2), trajectory=faster)
+        assert policy.decide(behind).score == pytest.approx(2.4)
 
     def test_a_goal_aside_is_lost_by_the_detour(self) -> None:
         aside = observe(FREE, time_s=2.0, goal=goal(5.5), best=goal(2.5, 3.25))
