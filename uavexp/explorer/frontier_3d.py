@@ -224,21 +224,8 @@ class Frontier3d:
 
     def _chosen(self, space: Space, observation: Observation) -> _Choice | None:
         """The target if seen cells lead there, else the best place; over worse ways if there is no other."""
-        here_m = observation.state.position_m
-        bound = observation.target_m is not None  # then the best place may be a new one far away
-        clusters = space.viewpoints.clusters(self.looks, here_m, whole=bound)
-        choice = self._over(space, observation, clusters)
-        if choice is None and space.viewpoints.waiting:
-            clusters = space.viewpoints.clusters(self.looks, here_m, whole=True)
-            choice = self._over(space, observation, clusters)
-        if choice is not None or not clusters or not self._aside:
-            return choice
-        self._aside.pop(0)  # what was set aside is tried again before all is given up
-        return self._chosen(space, observation)
-
-    def _over(self, space: Space, observation: Observation, clusters: Sequence[Cluster]) -> _Choice | None:
-        """The choice among clusters, over the best ways that lead to any."""
         here_m, target_m = observation.state.position_m, observation.target_m
+        clusters = space.viewpoints.clusters(self.looks, here_m)
         for known in (WIDE, NARROWER, ANY):
             space.ways.begin(space.cell_of(here_m), known)
             to_target_m = space.to_target_m()
@@ -247,7 +234,10 @@ class Frontier3d:
             choice = self._best(space, observation, clusters)
             if choice is not None:
                 return choice
-        return None
+        if not clusters or not self._aside:
+            return None
+        self._aside.pop(0)  # what was set aside is tried again before all is given up
+        return self._chosen(space, observation)
 
     def _bound_for(
         self, space: Space, observation: Observation, place_m: Float, score: float,

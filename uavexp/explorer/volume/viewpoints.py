@@ -15,7 +15,6 @@ from uavexp.field import TILE
 _SAMPLE = 16  # cells of a cluster that stand for it when places are sought
 _KEPT = 12  # places of a cluster, of those that show the most
 _NEAR_BEST = 0.7  # share of the most cells shown that is enough
-_SOUGHT = 3  # clusters for which places are sought at one time, where the rest may wait
 _OFFSETS = offsets_around()
 
 
@@ -47,34 +46,26 @@ class Viewpoints:
         self._least, self._most = least, most
         self._number: Int32 = np.zeros(cells.kind.size, np.int32)
         self._known: dict[bytes, Cluster] = {}
-        self.waiting = False  # whether there are clusters for which no places were sought yet
 
-    def clusters(self, looks: int, here_m: Float, *, whole: bool = False) -> list[Cluster]:
-        """Clusters of the frontier now; those that no place shows have no eyes.
-
-        Places are sought for the nearest of the new ones; the others wait for the next time (`waiting`).
+    def clusters(self, looks: int, here_m: Float) -> list[Cluster]:
+        """All clusters of the frontier now; those that no place shows have no eyes.
 
         Args:
             looks: cells looked at so often in vain are no frontier.
             here_m: (3,) the vehicle, a place like others.
-            whole: no cluster waits.
         """
         cells = self._cells
         frontier = cells.frontier(looks)
         index = cells.index(frontier)
-        parts = clusters_of(frontier, index, cells.steps, self._number, self._least, self._most)
-        found = [self._known.get(members.tobytes()) for members in parts]
-        new = [n for n, cluster in enumerate(found) if cluster is None or self._is_stale(cluster)]
-        first_m = cells.centre_m(np.array([parts[n][0] for n in new], dtype=np.int64))
-        order = np.argsort(np.linalg.norm(first_m - here_m, axis=1), kind="stable")
-        for place in order[: None if whole else _SOUGHT]:
-            found[new[place]] = self._sought(parts[new[place]], here_m)
-        self.waiting = not whole and len(new) > _SOUGHT
-        if self.waiting:
-            for place in order[_SOUGHT:]:
-                found[new[place]] = None
-        self._known = {item.cells.tobytes(): item for item in found if item is not None}
-        return list(self._known.values())
+        known = {}
+        for members in clusters_of(frontier, index, cells.steps, self._number, self._least, self._most):
+            key = members.tobytes()
+            cluster = self._known.get(key)
+            if cluster is None or self._is_stale(cluster):
+                cluster = self._sought(members, here_m)
+            known[key] = cluster
+        self._known = known
+        return list(known.values())
 
     def is_place(self, point_m: Float) -> bool:
         """Whether the body may wait at a point (3,)."""
