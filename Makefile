@@ -45,6 +45,10 @@ results: $(STAMP)
 bench: $(STAMP)
 	@$(BIN)/python -m benchmarks
 
+# From git clone to a moving picture of one's own building, timed in a fresh clone; another: make first FILE=office.ply
+first: $(STAMP)
+	@$(BIN)/python -m benchmarks.first_picture $(FILE)
+
 # Which of sixty broken lines of the core no test notices (an hour)
 mutants: $(STAMP)
 	@$(BIN)/python -m tests.mutants $(ARGS_MUTANTS)
