@@ -12,7 +12,7 @@ SUPPORTED := import sys; (3, 11) <= sys.version_info < (3, 14) or sys.exit(1); p
 PYTHON ?= $(shell for name in $(PYTHONS); do $$name -c '$(SUPPORTED)' 2>/dev/null && break; done)
 UV ?= $(shell uv --version >/dev/null 2>&1 && echo uv)
 
-.PHONY: run test check docs pages results bench golden conf lock clean
+.PHONY: run test fuzz first check docs pages results bench mutants golden conf lock clean
 .DELETE_ON_ERROR:
 
 run: $(STAMP)
