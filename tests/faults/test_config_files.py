@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
 from uavexp.cli.helptext import help_text
 from uavexp.config.composition import Composer
+from uavexp.config.files import yaml_files
+from uavexp.config.named import with_named
 from uavexp.config.overrides import parse_settings
 from uavexp.errors import ConfigError
 
@@ -58,3 +61,39 @@ def test_help_is_given_beside_any_file(group: str | None, folder: Path) -> None:
     text = help_text(folder, group)
     assert "own_latin" in text
     assert "fifo" not in text
+
+
+LAUGHS = "a0: &a0 [x, x, x, x]\n" + "".join(
+    f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]\n" for i in range(1, 12)
+)
+
+
+@pytest.mark.parametrize("place", ["trigger/mine.yaml", "experiments/a/mine.yaml", "mine.yaml"])
+def test_aliases_that_would_unpack_to_billions_are_refused_at_once(place: str, tmp_path: Path) -> None:
+    file = tmp_path / place
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(LAUGHS)
+    typed = {"trigger": "trigger=mine", "experiments": "experiments=a/mine"}.get(place.split("/")[0])
+    with pytest.raises(ConfigError, match="its aliases unpack to more than 100000 values"):  # noqa: PT012
+        settings = parse_settings([typed]) if typed else with_named("mine", tmp_path, [])
+        Composer(user_folder=tmp_path).command(settings)
+
+
+def test_a_few_aliases_are_a_way_to_write(tmp_path: Path) -> None:
+    (tmp_path / "experiments" / "a").mkdir(parents=True)
+    text = "axes: {arm: {x: &x {strategy: mcr}, y: {stuck_s: 9.0}}, again: {z: *x}}\n"
+    (tmp_path / "experiments" / "a" / "mine.yaml").write_text(text)
+    assert len(Composer(user_folder=tmp_path).command(parse_settings(["experiments=a/mine"])).cells) == 2
+
+
+def test_a_folder_that_cannot_be_searched_is_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of /proc, whose folders come and go, the system refuses some."""
+
+    def refused(folder: Path, pattern: str) -> NoReturn:
+        raise OSError(22, "Invalid argument", str(folder))
+
+    monkeypatch.setattr(Path, "glob", refused)
+    with pytest.raises(ConfigError, match="is no folder of configurations"):
+        yaml_files(tmp_path, "*.yaml")

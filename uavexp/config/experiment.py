@@ -30,6 +30,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from uavexp.config.files import refuse_unpacking, yaml_files
 from uavexp.config.options import text_of
 from uavexp.config.overrides import Setting, expand_grid, flatten, parse_settings, render
 from uavexp.errors import ConfigError, one_line
@@ -71,7 +72,7 @@ def list_experiments(user_folder: Path | None = None) -> dict[str, Path]:
     """
     found: dict[str, Path] = {}
     for folder in (experiments_folder(), *([user_folder / "experiments"] if user_folder else [])):
-        for file in sorted(filter(Path.is_file, folder.glob("*/*.yaml"))):
+        for file in yaml_files(folder, "*/*.yaml"):
             name = f"{file.parent.name}/{file.stem}"
             if name in found:
                 raise ConfigError(f"{file}: experiments={name} exists already; rename yours")
@@ -140,6 +141,7 @@ def _load(name: str, file: Path) -> dict[Any, Any]:
     from omegaconf import OmegaConf
     from omegaconf.errors import OmegaConfBaseException
 
+    refuse_unpacking(file)
     try:
         loaded = OmegaConf.load(file)  # unlike yaml itself, it refuses a key that stands there twice
         tree = OmegaConf.to_container(loaded, resolve=False)

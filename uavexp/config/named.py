@@ -15,6 +15,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from uavexp.config.files import refuse_unpacking
 from uavexp.config.overrides import Setting, flatten, parse_settings
 from uavexp.errors import ConfigError, one_line
 from uavexp.parameters import nearest
@@ -68,6 +69,7 @@ def _tree(file: Path) -> dict[str, Any]:
     from omegaconf import OmegaConf
     from omegaconf.errors import OmegaConfBaseException
 
+    refuse_unpacking(file)
     try:
         tree = OmegaConf.to_container(OmegaConf.load(file), resolve=False)
     except (OSError, ValueError, RecursionError, yaml.YAMLError, OmegaConfBaseException) as error:

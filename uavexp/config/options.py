@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from uavexp.config.files import yaml_files
 from uavexp.errors import ConfigError
 from uavexp.paths import expanded
 
@@ -51,7 +52,7 @@ def list_options(folders: Sequence[Path]) -> dict[str, dict[str, Path]]:
     """
     found: dict[str, dict[str, Path]] = {}
     for folder in folders:
-        for file in sorted(filter(Path.is_file, [*folder.glob("*/*.yaml"), *folder.glob("*/*/*.yaml")])):
+        for file in yaml_files(folder, "*/*.yaml", "*/*/*.yaml"):
             group = ".".join(file.parent.relative_to(folder).parts)
             if group.split(".")[0] == EXPERIMENT_GROUP:
                 continue

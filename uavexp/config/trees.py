@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from uavexp.config.files import refuse_unpacking
 from uavexp.config.options import PRESET_GROUP, list_options
 from uavexp.config.overrides import quoted
 from uavexp.errors import ConfigError, one_line
@@ -27,6 +28,12 @@ class Trees:
     user_folder: Path | None = None
     many: bool = False  # of a large grid: join trees of single options where that is the same
     _cache: dict[tuple[tuple[str, str], ...], dict[str, Any]] = field(default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        if self.user_folder is not None:
+            for files in list_options([self.user_folder]).values():
+                for file in files.values():
+                    refuse_unpacking(file)  # Hydra would unpack it
 
     def of(self, chosen: Mapping[str, str]) -> dict[str, Any]:
         """The tree of these options (group -> option), unresolved; not to be changed."""
