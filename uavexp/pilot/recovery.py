@@ -76,6 +76,7 @@ class Ladder:
     rung: Rung = Rung.GOALS
     since_s: float = math.inf  # on this rung; inf: it is not lost
     place_m: Place | None = None  # where it was lost last
+    first_s: float = math.inf  # when it was first lost there
     climbs: int = 0  # since anything was learned
     seen_m3: float = 0.0  # then
     away_m: float = math.inf  # of the target, then
@@ -112,11 +113,17 @@ def _begun(ladder: Ladder, now: Situation, patience: Patience) -> Ladder:
     learned = now.seen_m3 >= ladder.seen_m3 + _SEEN_M3 or now.away_m < ladder.away_m - _NEARER_M
     if learned or ladder.place_m is None:
         return Ladder(
-            since_s=now.time_s, place_m=now.here_m, seen_m3=now.seen_m3, away_m=min(now.away_m, ladder.away_m)
+            since_s=now.time_s,
+            place_m=now.here_m,
+            first_s=now.time_s,
+            seen_m3=now.seen_m3,
+            away_m=min(now.away_m, ladder.away_m),
         )
-    if _apart_m(now.here_m, ladder.place_m) <= _SAME_PLACE_M:
-        return replace(ladder, since_s=now.time_s + patience.wait_s - patience.of(ladder.rung))
-    return replace(ladder, rung=Rung.GOALS, since_s=now.time_s, place_m=now.here_m)
+    if _apart_m(now.here_m, ladder.place_m) > _SAME_PLACE_M:
+        return replace(ladder, rung=Rung.GOALS, since_s=now.time_s, place_m=now.here_m, first_s=now.time_s)
+    if ladder.rung is Rung.GOALS:  # one after the other it would try them all from here
+        return replace(ladder, since_s=ladder.first_s)
+    return replace(ladder, since_s=now.time_s + patience.wait_s - patience.of(ladder.rung))
 
 
 def _apart_m(here_m: Place, there_m: Place | None) -> float:

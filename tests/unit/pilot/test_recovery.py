@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -47,7 +48,22 @@ def test_a_rung_that_is_not_possible_is_passed_over_and_without_an_end_it_goes_o
 
 
 def test_who_gets_on_within_the_wait_never_climbs() -> None:
-    assert rungs([*standing(1.8), now(2.0, lost=False), *standing(3.8, from_s=2.2)]) == []
+    assert rungs([*standing(1.8), now(2.0, 2.0, lost=False), *standing(3.8, 2.0, from_s=2.2)]) == []
+
+
+def test_goals_that_are_all_held_at_one_place_have_the_time_of_one() -> None:
+    """Every other goal began the wait anew, and the vehicle stood until it was stuck."""
+    again = [
+        item
+        for n in range(8)
+        for item in (
+            now(1.6 * n, 0.02 * n),
+            now(1.6 * n + 0.2, 0.02 * n),
+            now(1.6 * n + 0.4, 0.02 * n, lost=False, busy=True),
+            now(1.6 * n + 0.6, 0.02 * n, lost=False),
+        )
+    ]
+    assert rungs(again)[0] == (pytest.approx(3.4), Rung.LOOK)
 
 
 def test_while_it_flies_or_backs_up_nothing_else_is_tried() -> None:
