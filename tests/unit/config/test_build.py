@@ -161,7 +161,7 @@ def test_a_checked_configuration_builds_again() -> None:
             "experiments=mcr/tabel1",
             ["no such experiment: mcr/tabel1 (did you mean 'mcr/table1'?), available: "],
         ),
-        ("planner=null", ["planner=None"]),
+        ("planner=null", ["planner=null: no such option", "bspline_mpc"]),
         ("out=a,b", ["out must be one folder"]),
         ("out=3", ["out must be one folder"]),
         ("seed=0 out=''", ["out must be one folder"]),

@@ -199,7 +199,7 @@ def test_what_was_not_read_is_named(tmp_path: Path) -> None:
         + model(seen, "picture")
         + model(name="robot", inner=f'<plugin name="p"/><link name="l">{collision()}</link>')
         + model(name="lost", pose="<pose>0 0 400000 0 0 0</pose>")
-        + "".join(f"<include><uri>model://{name}</uri></include>" for name in "abcdefg")
+        + "".join(f"<include><uri>model://{name}_</uri></include>" for name in "abcdefg")
         + "<include><uri>https://fuel.gazebosim.org/1.0/openrobotics/models/Sun</uri></include>"
         + '<actor name="walker"/>'
     )
@@ -211,11 +211,11 @@ def test_what_was_not_read_is_named(tmp_path: Path) -> None:
         "models that are seen but collide with nothing were not read: picture",
         "models with plugins, which may move them, stand still: robot",
         "models farther than 10000 m from the others were not read: lost",
-        "models were not found beside the world or above it, and are missing: a, b, c, d, e and 2 more",
+        "models were not found beside the world or above it, and are missing: a_, b_, c_, d_, e_ and 2 more",
         "elements of the kind actor were not read: walker",
     }
-    with pytest.raises(WorldError, match=r"holds nothing solid: models were not found .*: a$"):
-        read(tmp_path, world("<include><uri>model://a</uri></include>"))
+    with pytest.raises(WorldError, match=r"holds nothing solid: models were not found .*: a_$"):
+        read(tmp_path, world("<include><uri>model://a_</uri></include>"))
 
 
 def test_gazebo_s_own_ground_plane_needs_no_file(tmp_path: Path) -> None:
