@@ -21,20 +21,21 @@ nor plan comes, time runs to the end of the pace, where the vehicle stands. (5) 
 over updates and plans the reference is in a verified place at all times, and the body is clear of
 all that is mapped as long as the assumptions hold.
 
-**Assumptions.** What was seen as free is free and stays so: the map is wrong by less than `margin_m` and
-what is kept by the planner beyond it (a plate thinner than half a voxel, seen edge-on, may be missing
-from `mapping=dense`; `dense_thin` has it), and nothing moves (movers are the planner's and the trigger's
-to avoid); the vehicle is on its reference but for an error below the same margin and what is left
-between the body and its turning circle: half of the time it is below 0.02 m, at most 0.04 to 0.23 m in
-flights at 2.5 and 5 m/s (column `tracking_error_max_m`). It is counted, not proved: the pace falls to 0
-as the error, or what the present difference of velocity makes of it, comes to the room beside the way,
-and to `stop_error_m` anywhere; and no pace turns the acceleration faster than the vehicle follows, but
-where the rest would be missed. The pose is right (drift is not seen). The start is free for
-`start_bubble_m` or as far as it is in truth, whichever is less; out of what was not seen around it the
-vehicle creeps, at `creep_mps`, as long as the cell of its centre was seen. A vehicle that is pushed off,
-or that fell behind, stops in a straight line. With `person_mps` it is also slow enough everywhere to
-stop before somebody who steps out of a place that is hidden now; whoever is in sight is the planner's
-and the trigger's.
+**Assumptions.** What was seen as free is free and stays so: the map is wrong by less than `margin_m`
+and what is kept by the planner beyond it (a plate thinner than half a voxel, seen edge-on, may be
+missing from `mapping=dense`; `dense_thin` has it), and nothing moves (movers are the planner's and the
+trigger's to avoid); the vehicle is on its reference but for an error below the same margin and what is
+left between the body and its turning circle. At 2.5 m/s half of 1,120 flights never came off by more
+than 0.05 m, 99 in 100 by no more than 0.14 m, the worst by 0.33 m; at 5 m/s and 4 m/s², where a new
+plan may turn at once as sharply as the limit allows, the worst of 56 by 0.45 m, and it touched (column
+`tracking_error_max_m`). It is counted, not proved: the pace falls to 0 as the error, or what the
+present difference of velocity makes of it, comes to the room beside the way, and to `stop_error_m`
+anywhere; and no pace turns the acceleration faster than the vehicle follows, but where the rest would
+be missed. The pose is right (drift is not seen). The start is free for `start_bubble_m` or as far as it
+is in truth, whichever is less; out of what was not seen around it the vehicle creeps, at `creep_mps`,
+as long as the cell of its centre was seen. A vehicle that is pushed off, or that fell behind, stops in
+a straight line. With `person_mps` it is also slow enough everywhere to stop before somebody who steps
+out of a place that is hidden now; whoever is in sight is the planner's and the trigger's.
 
 Source: Tordesillas, Lopez, Everett and How, FASTER, T-RO 2021; Ren et al., SUPER, Science Robotics 2025.
 There a second trajectory is the back-up; here the plan's own way is, slowed.
