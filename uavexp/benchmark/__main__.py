@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Sequence
 from html import escape
@@ -12,14 +11,13 @@ import pandas as pd
 
 from uavexp.benchmark.entry import SUITE, entry_of
 from uavexp.benchmark.standings import numbers, rows_of, standings
-from uavexp.cli.arguments import without_config_dir
+from uavexp.cli.arguments import run_or_explain, without_config_dir
 from uavexp.cli.terminal import Terminal
 from uavexp.config.composition import Composer
 from uavexp.config.experiment import read_experiment
 from uavexp.config.options import user_folder
 from uavexp.config.overrides import parse_settings
 from uavexp.errors import ConfigError
-from uavexp.interrupts import exit_code_of, leave_at_once
 from uavexp.paths import experiments_folder, outputs_root
 from uavexp.report.html import page
 from uavexp.report.html_parts import code, paragraph, table
@@ -50,14 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     0; 1 a trial did not run to its end; 2 bad input; 130 interrupted.
     """
-    os.environ["MPLBACKEND"] = "Agg"
-    typed = sys.argv[1:] if arguments is None else list(arguments)
-    is_asked = bool({"-h", "--help"} & set(typed))
-    if is_asked or not typed:
-        (sys.stdout if is_asked else sys.stderr).write(USAGE)
-        return 0 if is_asked else 2
-    leave_at_once()
-    return exit_code_of(lambda: _run(typed))
+    return run_or_explain(arguments, USAGE, _run)
 
 
 def _run(typed: Sequence[str]) -> int:

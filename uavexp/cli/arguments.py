@@ -2,9 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+import sys
+from collections.abc import Callable, Sequence
 
 from uavexp.errors import ConfigError
+from uavexp.interrupts import exit_code_of, leave_at_once
+
+
+def run_or_explain(arguments: Sequence[str] | None, usage: str, run: Callable[[list[str]], int]) -> int:
+    """Run a command that reports, on what was typed, or say how it is used; its exit code.
+
+    Args:
+        arguments: those typed; None: the process's own.
+        usage: printed when asked for (exit code 0), or when nothing was typed (2).
+        run: takes the words typed.
+    """
+    os.environ["MPLBACKEND"] = "Agg"
+    typed = sys.argv[1:] if arguments is None else list(arguments)
+    is_asked = bool({"-h", "--help"} & set(typed))
+    if is_asked or not typed:
+        (sys.stdout if is_asked else sys.stderr).write(usage)
+        return 0 if is_asked else 2
+    leave_at_once()
+    return exit_code_of(lambda: run(typed))
 
 
 def without_config_dir(typed: Sequence[str], command: str) -> tuple[list[str], str | None]:

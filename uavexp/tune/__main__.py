@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import os
 import re
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from uavexp.cli.arguments import without_config_dir
+from uavexp.cli.arguments import run_or_explain, without_config_dir
 from uavexp.cli.terminal import Terminal
 from uavexp.config.composition import CELL_AXIS, CommandLine, Composer
 from uavexp.config.experiment import Experiment
 from uavexp.config.options import user_folder
 from uavexp.config.overrides import parse_settings
 from uavexp.errors import ConfigError
-from uavexp.interrupts import exit_code_of, leave_at_once
 from uavexp.report.comparison import SCENE
 from uavexp.store.folder import folder_of
 from uavexp.tune.objective import objectives
@@ -48,14 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     0; 1 the disk was full; 2 bad input; 130 interrupted.
     """
-    os.environ["MPLBACKEND"] = "Agg"
-    typed = sys.argv[1:] if arguments is None else list(arguments)
-    is_asked = bool({"-h", "--help"} & set(typed))
-    if is_asked or not typed:
-        (sys.stdout if is_asked else sys.stderr).write(USAGE)
-        return 0 if is_asked else 2
-    leave_at_once()
-    return exit_code_of(lambda: _tune(typed))
+    return run_or_explain(arguments, USAGE, _tune)
 
 
 def _tune(typed: Sequence[str]) -> int:
