@@ -80,8 +80,17 @@ def raise_if_refused(patience_s: float = 0.0) -> None:
                 break
             time.sleep(0.01)
     if ended and ended.si_code == os.CLD_EXITED and ended.si_status == REFUSED:
-        with refusals_told():
-            raise OSError(errno.EAGAIN, os.strerror(errno.EAGAIN))
+        raise_refused()
+
+
+def raise_refused() -> None:
+    """Tell that the system refuses a process, which another process has found.
+
+    Raises:
+        RefusedError: always.
+    """
+    with refusals_told():
+        raise OSError(errno.EAGAIN, os.strerror(errno.EAGAIN))
 
 
 class RefusedError(UavexpError):

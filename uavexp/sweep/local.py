@@ -35,6 +35,7 @@ from uavexp.sweep.fork_server import (
     ensure_fork_server,
     kill_fork_server,
     raise_if_refused,
+    raise_refused,
     refusals_told,
 )
 from uavexp.sweep.job import Allowance, Answer, Call, Done, Job
@@ -212,8 +213,7 @@ class _Supervisor:
         with child.connection, child.printed:
             exit_code = self._end(child, grace_s=0.0 if late else _PARTING_S)
             if answer is None and exit_code == REFUSED:
-                with refusals_told():
-                    raise OSError(errno.EAGAIN, os.strerror(errno.EAGAIN))
+                raise_refused()
             if answer is None and exit_code == LOST:
                 raise_if_refused(patience_s=1.0)
             return answer or (self._hung if late else death(exit_code, _tail(child.printed)))
