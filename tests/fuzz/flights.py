@@ -15,16 +15,19 @@ import numpy as np
 from tests.fuzz.commands import drawn, faults_of
 from tests.sweeps import QUICK
 from uavexp.config.composition import Composer
+from uavexp.flight import fly_cell
 from uavexp.store.logs import unpack
+from uavexp.store.outputs import trial_files
 from uavexp.store.records import Status
 from uavexp.sweep.agenda import agenda_of
 from uavexp.sweep.fork_server import start_fork_server
 from uavexp.sweep.head_start import PRELOAD
-from uavexp.sweep.job import Allowance, Done, Job
+from uavexp.sweep.job import Allowance, Done, Job, Progress
 from uavexp.sweep.local import run_local
-from uavexp.sweep.trial_job import fly_job
+from uavexp.sweep.trial_job import TrialJob, fly_job
 
 LIMITS = Allowance(timeout_s=60.0, memory_mb=4000.0)
+_DRAWN_EACH = 4  # a picture costs more than its flight
 _SHORT = 0.1  # s, and s a metre, square metre or viewpoint
 _DURATIONS = {
     "explore": ("time_base_s", "time_per_area_spm2"),
@@ -55,7 +58,8 @@ def jobs(composer: Composer, count: int, seed: int, place: Path) -> Iterator[Job
             job = agenda_of(command, place).jobs[0]
         except Exception:  # refused: the composer's part of the fuzzer looks at that
             continue
-        yield Job(name=f"{made} {job.name}", label=" ".join(words), payload=job.payload)
+        payload = (job.payload, made % _DRAWN_EACH == 0)
+        yield Job(name=f"{made} {job.name}", label=" ".join(words), payload=payload)
         made += 1
 
 
@@ -64,19 +68,28 @@ def _clashes(word: str, taken: set[str]) -> bool:
     return word.split("=")[0].split(".")[0] in taken
 
 
+def fly_one(asked: tuple[TrialJob, bool], progress: Progress) -> dict[str, bytes]:
+    """Fly as a sweep does, with a picture or without one; the files of the trial."""
+    trial_job, drawn = asked
+    if drawn:
+        return fly_job(trial_job, progress).files
+    trial = fly_cell(trial_job.cell, trial_job.seed, progress, trial_job.keep_world)
+    return trial_files(trial, {**trial_job.identity, **trial_job.version}, {})
+
+
 def fly(
     composer: Composer, count: int, seed: int, place: Path, n_jobs: int = 2
 ) -> Iterator[tuple[str, list[str]]]:
     """Fly; the status of each, and what ended as nothing may end."""
-    start_fork_server([PRELOAD])
-    for done in run_local(fly_job, jobs(composer, count, seed, place), n_jobs=n_jobs, limits=LIMITS):
+    start_fork_server([PRELOAD, "tests.fuzz.flights"])
+    for done in run_local(fly_one, jobs(composer, count, seed, place), n_jobs=n_jobs, limits=LIMITS):
         yield str(done.answer.status), list(_faults(done))
 
 
 def _faults(done: Done) -> Iterator[str]:
     answer = done.answer
     if answer.status is Status.OK:
-        yield from (f"{done.job.label}: {fault}" for fault in _not_finite(answer.value.files))
+        yield from (f"{done.job.label}: {fault}" for fault in _not_finite(answer.value))
     elif not answer.mendable:
         yield f"{done.job.label}: {answer.status}: {answer.reason} {answer.trace[-2:]}"
     elif not answer.reason or "\n" in answer.reason:

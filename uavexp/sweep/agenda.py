@@ -59,10 +59,11 @@ def agenda_of(
         declared(study)  # a report that cannot be made is refused before the first flight
     if (folder / STUDY).exists():
         study = _joined(read_study(folder), study, command, user_folder)
+    ours = version()
     return Agenda(
         study=study,
-        jobs=_jobs(command, folder, identities, version(), user_folder),
-        stock=take_stock(folder, version(), accept_other_code=accept_other_code),
+        jobs=_jobs(command, folder, identities, ours, user_folder),
+        stock=take_stock(folder, ours, accept_other_code=accept_other_code),
     )
 
 
