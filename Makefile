@@ -2,6 +2,8 @@
 # make run ARGS="strategy=tbr seed=0:3"      make run PYTHON=python3.12      make lock LOCKFLAGS=--upgrade
 
 ARGS ?= strategy=mcr seed=0
+# Tests: a process for each core, up to 8, those of one file in one; all in this very process: make test ARGS_TEST=
+ARGS_TEST ?= --numprocesses=auto --maxprocesses=8 --dist=loadfile --no-loadscope-reorder
 VENV ?= .venv
 PYTHONS ?= python3.13 python3.12 python3.11 python3
 BIN := $(VENV)/bin

@@ -17,7 +17,7 @@ from tests.sweeps import QUICK, begin, records, variables
 from uavexp.__main__ import main
 
 pytest.importorskip("distributed", reason="Dask is an extra: pip install 'uavexp[dask]'")
-LIMIT_S = 30.0
+LIMIT_S = 30.0  # said to a user
 _SCHEDULER = """
 import asyncio, sys
 from distributed import Scheduler, Worker

@@ -92,7 +92,7 @@ def test_a_terminal_that_closes_leaves_the_tables(tmp_path: Path) -> None:
         assert process.poll() is None
         time.sleep(0.02)
     process.send_signal(signal.SIGHUP)
-    _, error = process.communicate(timeout=60)
+    _, error = process.communicate(timeout=120)
     assert (process.returncode, error) == (130, "interrupted\n")
     assert (out / "trials.parquet").is_file()
 
@@ -101,6 +101,6 @@ def test_what_a_killed_command_left_in_the_temporary_folder_goes_with_the_next(t
     code = "from uavexp.sweep.fork_server import start_fork_server as f; f(); import os, signal; {}"
     for last in ("os.kill(os.getpid(), signal.SIGKILL)", "pass"):
         more = {"TMPDIR": str(tmp_path)}
-        subprocess.run([sys.executable, "-c", code.format(last)], env=variables(**more), timeout=60)
+        subprocess.run([sys.executable, "-c", code.format(last)], env=variables(**more), timeout=120)
         left = os.listdir(tmp_path)
         assert len(left) == (1 if "kill" in last else 0)

@@ -31,5 +31,5 @@ def test_an_interrupt_of_a_whole_group_is_one_line(delay_s: float, tmp_path: Pat
     wait_until_it_hears(process)
     time.sleep(delay_s)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does: the fork server and the children, too
-    _, error = process.communicate(timeout=60)
+    _, error = process.communicate(timeout=120)
     assert (process.returncode, error) == (130, "interrupted\n")

@@ -114,7 +114,7 @@ def test_an_output_folder_that_goes_in_mid_flight(deed: str, tmp_path: Path) -> 
             shutil.rmtree(out, ignore_errors=True)
     else:
         out.rename(elsewhere)
-    told, error = process.communicate(timeout=60)
+    told, error = process.communicate(timeout=120)
     assert (process.returncode, error.count("\n")) == (1, 1), error
     assert "was deleted or moved" in error
     assert "are kept in" not in told

@@ -18,7 +18,7 @@ from uavexp.sweep.fork_server import start_fork_server
 from uavexp.sweep.job import Allowance, Done, Job
 from uavexp.sweep.local import run_local
 
-LIMITS = Allowance(timeout_s=2.0, memory_mb=1000.0)
+LIMITS = Allowance(timeout_s=4.0, memory_mb=1000.0)
 
 
 def start(*deeds: str, n_jobs: int = 1) -> Iterator[Done]:
@@ -32,7 +32,7 @@ def test_a_child_stopped_in_mid_answer_is_ended_at_its_deadline(n_jobs: int) -> 
     """Half a message came, and the supervisor read on for ever."""
     begin_s = time.monotonic()
     done = {item.job.label: item.answer for item in start("nothing", "answer_half", "sleep", n_jobs=n_jobs)}
-    assert time.monotonic() - begin_s < 15.0
+    assert time.monotonic() - begin_s < 40.0
     assert {label: answer.status for label, answer in done.items()} == {
         "nothing": Status.OK, "answer_half": Status.HUNG, "sleep": Status.OK
     }  # fmt: skip
@@ -44,14 +44,14 @@ def test_a_stopped_fork_server_costs_one_trial_its_time_and_is_replaced() -> Non
     os.kill(server, signal.SIGSTOP)
     begin_s = time.monotonic()
     done = list(start("nothing", "nothing"))
-    assert time.monotonic() - begin_s < 15.0
+    assert time.monotonic() - begin_s < 40.0
     assert [item.answer.status for item in done] == [Status.HUNG, Status.OK]
 
 
 def test_a_child_under_a_stopped_fork_server_is_ended_at_its_deadline() -> None:
     begin_s = time.monotonic()
     done = list(start("stop_parent_and_sleep", "nothing"))
-    assert time.monotonic() - begin_s < 25.0
+    assert time.monotonic() - begin_s < 40.0
     assert [item.answer.status for item in done] == [Status.HUNG, Status.OK]
 
 
@@ -69,9 +69,9 @@ def test_an_interrupt_ends_what_is_stopped(stopped: str, tmp_path: Path) -> None
     time.sleep(1.0)
     begin_s = time.monotonic()
     process.send_signal(signal.SIGINT)
-    _, error = process.communicate(timeout=60)
+    _, error = process.communicate(timeout=120)
     assert (process.returncode, error) == (130, "interrupted\n")
-    assert time.monotonic() - begin_s < 20.0
+    assert time.monotonic() - begin_s < 40.0
     assert not [pid for pid in targets if Path(f"/proc/{pid}").exists() and cmdline(pid)]
 
 

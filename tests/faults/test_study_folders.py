@@ -50,7 +50,7 @@ def test_what_is_no_file_is_waited_for_by_nobody(name: str, make: Callable[[Path
     (place / name).unlink(missing_ok=True)
     make(place / name)
     for reader in READERS[1:]:
-        with in_time(20.0), contextlib.suppress(UavexpError):
+        with in_time(60.0), contextlib.suppress(UavexpError):
             reader(copy)
 
 

@@ -257,7 +257,7 @@ def test_an_interrupted_sweep_says_how_to_go_on(tmp_path: Path) -> None:
     while not process.stdout.readline().startswith("[2/6]"):
         assert process.poll() is None
     process.send_signal(signal.SIGINT)
-    out, error = process.communicate(timeout=30)
+    out, error = process.communicate(timeout=120)
     assert process.returncode == 130
     assert error == "interrupted\n"
     assert f"of 6 trials are kept in {folder}; the same command flies the others" in out

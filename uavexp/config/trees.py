@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import functools
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -19,15 +20,16 @@ from uavexp.paths import conf_folder
 TRIGGER_GROUP = "trigger"  # what presets choose
 CONFIG_NAME = "config"
 _OF_ONE_COMPOSITION = ("runtime", "overrides", "job")  # parts of `hydra` that only tell what was typed
+_Kept = dict[tuple[tuple[str, str], ...], dict[str, Any]]  # trees by what was chosen
 
 
 @dataclass(slots=True, kw_only=True)
 class Trees:
-    """Composed trees of options, kept."""
+    """Composed trees of options, kept: the shipped ones as long as the process lives."""
 
     user_folder: Path | None = None
     many: bool = False  # of a large grid: join trees of single options where that is the same
-    _cache: dict[tuple[tuple[str, str], ...], dict[str, Any]] = field(default_factory=dict, repr=False)
+    _own: _Kept = field(default_factory=dict, repr=False)  # with a user's folder, which may change
 
     def __post_init__(self) -> None:
         if self.user_folder is not None:
@@ -37,11 +39,12 @@ class Trees:
 
     def of(self, chosen: Mapping[str, str]) -> dict[str, Any]:
         """The tree of these options (group -> option), unresolved; not to be changed."""
+        kept = _shipped(conf_folder(), self.many) if self.user_folder is None else self._own
         key = tuple(sorted(chosen.items()))
-        if key not in self._cache:
+        if key not in kept:
             joined = self._join(chosen) if self.many and len(chosen) > 1 else None
-            self._cache[key] = joined or self._compose(chosen)
-        return self._cache[key]
+            kept[key] = joined or self._compose(chosen)
+        return kept[key]
 
     def _join(self, chosen: Mapping[str, str]) -> dict[str, Any] | None:
         """The tree of several options from trees of one each: a grid needs their sum, not their product.
@@ -116,6 +119,12 @@ class Trees:
         asking = " ".join(word for word in arguments if not word.startswith("hydra."))
         hint = f"{nearest(option, there)}; {group} may be {', '.join(there)}" if there else ""
         return f"{asking} asks for {group}={option}: no such option{hint}"
+
+
+@functools.cache
+def _shipped(folder: Path, many: bool) -> _Kept:
+    """Trees of this folder's options that were composed before; with and without joining, each its own."""
+    return {}
 
 
 def _without(tree: Mapping[str, Any], group: str) -> dict[str, Any]:

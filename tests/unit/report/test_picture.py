@@ -180,9 +180,9 @@ def test_a_building_of_300_000_triangles_is_drawn_in_seconds_not_minutes(tmp_pat
     triangles = np.arange(300_000, dtype=np.int32).reshape(-1, 3)
     world = dataclasses.replace(world, vertices_m=vertices, triangles=np.concatenate([triangles] * 3))
     draw(world, log, {}, COMMAND, tmp_path / "first.png")
-    begin = time.perf_counter()
+    begin_s = time.process_time()
     draw(world, log, {}, COMMAND, tmp_path / "a.png")
-    assert time.perf_counter() - begin < 10.0  # 0.5 s on an idle core
+    assert time.process_time() - begin_s < 10.0  # 0.5 s here
 
 
 def test_a_failed_trial_says_why(tmp_path):

@@ -79,8 +79,8 @@ def test_a_job_that_hangs_is_ended_at_its_limit(deed: str) -> None:
     done = run(jobs((deed, 60.0)), limits=Allowance(timeout_s=1.0, memory_mb=1000.0))[deed]
     assert done.answer.status is Status.HUNG
     assert done.answer.reason == "not done after 1 s"
-    assert 1.0 <= done.wall_s < 10.0
-    assert time.monotonic() - begin_s < 20.0
+    assert 1.0 <= done.wall_s < 30.0
+    assert time.monotonic() - begin_s < 50.0
 
 
 def test_memory_within_the_limit_is_granted() -> None:
@@ -105,7 +105,7 @@ def test_a_child_goes_on_after_what_went_well_and_loses_no_other_job(
         *[("note", tmp_path)] * 4, (deed, 60.0 if deed == "sleep" else 1.0), *[("note", tmp_path)] * 2
     )
     start_fork_server(["tests.jobs"])
-    limits = Allowance(timeout_s=3.0, memory_mb=1000.0)
+    limits = Allowance(timeout_s=5.0, memory_mb=1000.0)
     done = {int(item.job.name): item for item in run_local(act, given, n_jobs=1, limits=limits)}
     assert [done[number].answer.status for number in range(7)] == [Status.OK] * 4 + [status] + [Status.OK] * 2
     assert len(noted(tmp_path)) == (1 if deed == "nothing" else 2)
@@ -196,7 +196,7 @@ def test_an_interrupt_finds_no_child_half_begun(n_jobs: int) -> None:
         env=variables,
         capture_output=True,
         text=True,
-        timeout=30,
+        timeout=120,
     )
     assert (ended.returncode, ended.stdout, ended.stderr) == (0, "interrupted\n", "")
 
@@ -221,7 +221,7 @@ def alive(pid: int) -> bool:
     return state not in "ZX"
 
 
-def wait_for(condition: Any, limit_s: float = 30.0) -> None:
+def wait_for(condition: Any, limit_s: float = 50.0) -> None:
     """Wait until something is so; fail when it does not come."""
     end_s = time.monotonic() + limit_s
     while not condition():
