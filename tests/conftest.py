@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
 import os
 import shutil
+import tempfile
+from pathlib import Path
+from subprocess import CalledProcessError
 
 import pytest
 from hypothesis import settings
 
 from tests.folders import DATA
+from tests.golden.flights import FLOWN, fly_apart
 from uavexp.__main__ import main
 from uavexp.store.study import STUDY, Study, read_study
 
 # a failure in one clone is one in all, and a slow machine is none
 settings.register_profile("same_everywhere", derandomize=True, deadline=None)
 settings.load_profile("same_everywhere")
+
 
 STORED = DATA / "study"
 _SMALL = (
@@ -26,6 +33,16 @@ _SMALL = (
     "world.size_m=[10,8,3]",
     "stuck_s=8",
 )
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Before several processes share the tests: the golden flights, which compile the kernels for all."""
+    if session.config.getoption("numprocesses", None) and not hasattr(session.config, "workerinput"):
+        file = Path(tempfile.mkdtemp(prefix="uavexp-golden-")) / "flown.json"
+        session.config.add_cleanup(lambda: shutil.rmtree(file.parent))
+        with contextlib.suppress(CalledProcessError):  # their test tells
+            file.write_text(json.dumps(fly_apart()), encoding="utf-8")
+            os.environ[FLOWN] = str(file)  # the processes inherit it
 
 
 @pytest.fixture(scope="session", autouse=True)

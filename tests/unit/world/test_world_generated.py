@@ -1,5 +1,6 @@
 """What every generated family promises, checked through the scene, not the generator's lattice."""
 
+import functools
 import importlib
 
 import numpy as np
@@ -23,9 +24,12 @@ def draw(family: type, seed: int, **parameters: object) -> World:
     return family(**parameters).generate(generator(seed, Stream.WORLD))
 
 
+usual = functools.cache(draw)  # by family and seed
+
+
 @pytest.fixture(scope="module", params=[(f, s) for f in FAMILIES for s in range(4)], ids=str)
 def drawn(request: pytest.FixtureRequest) -> World:
-    return draw(*request.param)
+    return usual(*request.param)
 
 
 def test_start_and_target_are_joined_with_the_clearance(drawn: World) -> None:
@@ -106,7 +110,7 @@ def test_sight_from_start_to_target_is_usually_blocked() -> None:
     blocked = 0
     for family in FAMILIES:
         for seed in range(3):
-            world = draw(family, seed)
+            world = usual(family, seed)
             ray = np.hstack([world.start_m, world.target_m - world.start_m])[None]
             blocked += int(Scene(world).cast(ray.astype(np.float32))[0][0] < 1.0)
     assert blocked >= 9  # of 12
