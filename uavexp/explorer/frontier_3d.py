@@ -33,9 +33,9 @@ from uavexp.explorer.aside import lie_aside
 from uavexp.explorer.volume.cells import Body, Cells
 from uavexp.explorer.volume.route import ANY, NARROWER, WIDE, Ways, optimistic
 from uavexp.explorer.volume.space import Candidates, Space, leg_is_done
+from uavexp.explorer.volume.steps import MOST_PRICE
 from uavexp.explorer.volume.viewpoints import Cluster, Viewpoints
 from uavexp.explorer.volume.views import Places, Sight
-from uavexp.explorer.volume.waves import MOST_PRICE
 from uavexp.geometry import wrap_angle, yaw_of
 from uavexp.parameters import (
     Count,

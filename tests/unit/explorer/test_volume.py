@@ -15,17 +15,16 @@ from uavexp.check.fields import empty, field_from
 from uavexp.explorer.volume.cells import CLOSED, EDGE, NARROW, OPEN, UNSEEN, Body, Cells
 from uavexp.explorer.volume.clusters import clusters_of
 from uavexp.explorer.volume.route import ANY, WIDE, optimistic
+from uavexp.explorer.volume.steps import Prices, steps_on
 from uavexp.explorer.volume.views import Places, Sight, look_from, seen_from
 from uavexp.explorer.volume.waves import (
     FAR,
-    Prices,
     begin,
     forget,
     least_change,
     new_wave,
     reach,
     reach_nearest,
-    steps_on,
     straight_cost,
     trace,
 )
@@ -89,7 +88,7 @@ def test_costs_equal_scipys_and_follow_every_change(seed: int) -> None:
             if len(changed):
                 level = least_change(wave, STEPS, changed)
                 if level < FAR - 1:
-                    forget(wave, kind.reshape(-1), STEPS, price, level)
+                    forget(wave, level)
 
 
 @pytest.mark.parametrize("seed", range(4))

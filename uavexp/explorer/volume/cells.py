@@ -14,7 +14,7 @@ import numba as nb
 import numpy as np
 
 from uavexp.arrays import Bool, Float, Float32, Int, Int32, UInt8
-from uavexp.explorer.volume.waves import Steps, steps_on
+from uavexp.explorer.volume.steps import Steps, steps_on
 from uavexp.field import TILE, UNKNOWN, DistanceField
 
 # kinds of cells. Closed: outside, or too near to what is mapped. Edge: seen, but not all around the body.

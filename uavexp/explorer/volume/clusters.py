@@ -6,7 +6,7 @@ import numba as nb
 import numpy as np
 
 from uavexp.arrays import Int, Int32
-from uavexp.explorer.volume.waves import Steps
+from uavexp.explorer.volume.steps import Steps
 
 
 @nb.njit(cache=True)

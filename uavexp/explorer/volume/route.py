@@ -8,11 +8,9 @@ import numpy as np
 
 from uavexp.arrays import Float, Int, Int32
 from uavexp.explorer.volume.cells import Cells
+from uavexp.explorer.volume.steps import MOST_PRICE, UNIT, Prices, prices
 from uavexp.explorer.volume.waves import (
     FAR,
-    MOST_PRICE,
-    UNIT,
-    Prices,
     Wave,
     begin,
     forget,
@@ -34,9 +32,9 @@ _MEASURED = 1  # places from which ways are sought at one time; those of others 
 _NARROW_PRICE = 3.0
 # prices of the kinds of cells on ways over what was seen: without narrow places, with them, and with
 # places of which not all around was seen, as that of the start
-WIDE = Prices(np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0]), np.ones(6))
-NARROWER = Prices(np.array([0.0, 0.0, 0.0, 1.0, 0.0, _NARROW_PRICE]), np.ones(6))
-ANY = Prices(np.array([0.0, 0.0, MOST_PRICE, 1.0, 0.0, _NARROW_PRICE]), np.ones(6))
+WIDE = prices(np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0]), np.ones(6))
+NARROWER = prices(np.array([0.0, 0.0, 0.0, 1.0, 0.0, _NARROW_PRICE]), np.ones(6))
+ANY = prices(np.array([0.0, 0.0, MOST_PRICE, 1.0, 0.0, _NARROW_PRICE]), np.ones(6))
 
 
 def optimistic(unseen: float, climb: float) -> Prices:
@@ -47,7 +45,7 @@ def optimistic(unseen: float, climb: float) -> Prices:
         climb: how much dearer steps up or down are there.
     """
     narrow = max(unseen, _NARROW_PRICE)
-    return Prices(
+    return prices(
         np.array([0.0, unseen, 1.0, 1.0, narrow, _NARROW_PRICE]),
         np.array([1.0, climb, 1.0, 1.0, climb, 1.0]),
     )
@@ -85,7 +83,7 @@ class Ways:
         if self.target is not None and len(changed):
             level = least_change(self._beyond, cells.steps, changed)
             if level < FAR - 1:
-                forget(self._beyond, cells.kind, cells.steps, self.optimistic, level)
+                forget(self._beyond, level)
 
     def begin(self, vehicle: int, known: Prices) -> None:
         """Ask for ways from this cell over what was seen, at these prices."""

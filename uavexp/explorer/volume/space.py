@@ -12,8 +12,8 @@ from uavexp.arrays import Bool, Float, Int
 from uavexp.explorer.volume.cells import NARROW, OPEN, Body, Cells
 from uavexp.explorer.volume.legs import is_straight, next_leg
 from uavexp.explorer.volume.route import PLACES, Ways
+from uavexp.explorer.volume.steps import Prices
 from uavexp.explorer.volume.viewpoints import Cluster, Viewpoints
-from uavexp.explorer.volume.waves import Prices
 
 _LEAST_LEG_M = 0.8
 _LEG_DONE_M = 1.2  # so near to the end of a leg the next one is flown to, before the vehicle brakes

@@ -1,9 +1,10 @@
 """Least costs of ways over cells of space, spreading from one cell as far as somebody asks (numba).
 
 As `explorer.waves` on the plane: Dijkstra (1959) with Dial's (1969) buckets, costs in hundredths of a
-cell. Here a bucket is a list through the cells themselves, so a wave takes five numbers a cell however
+cell. Here a bucket is a list through the cells themselves, so a wave takes six numbers a cell however
 often costs fall. A step to one of 26 neighbours costs its length times the mean price of both cells.
-Corners may be cut: what divides rooms is at least two cells thick where the clearance is kept.
+Corners may be cut: what divides rooms is at least two cells thick where the clearance is kept. Where every
+passable cell costs the same, steps that `volume.steps` spares are not tried.
 
 A wave is kept while cells change (`forget`): up to the least cost that a change can touch it stands.
 """
@@ -16,15 +17,15 @@ from typing import NamedTuple
 import numba as nb
 import numpy as np
 
-from uavexp.arrays import Bool, Float, Int, Int32, UInt8
+from uavexp.arrays import Bool, Int, Int32, UInt8
+from uavexp.explorer.volume.steps import ANY_STEP, MOST_PRICE, UNIT, Prices, Steps
 from uavexp.memory import blank
 
 FAR = 2**31 - 1
-UNIT = 100  # a straight step between cells of the least price
-MOST_PRICE = 5.0
 _FACE, _CORNER = 141, 173  # steps across an edge and a corner
 _BUCKETS = 1024  # > the longest step
 _RING = _BUCKETS - 1
+_LONGEST = int(MOST_PRICE * 1.7321 * UNIT) + 1
 _NOW, _WAITING, _LEFT = 0, 1, 2
 
 
@@ -35,63 +36,47 @@ class Wave(NamedTuple):
     head: Int32  # (1024,) first cell of each bucket, -1: none
     following: Int32  # (N,) next cell of its bucket
     before: Int32  # (N,) the one before it, -1: it is the first
+    came: Int32  # (N,) bits of the last steps of least ways to each cell; `ANY_STEP` as well
     order: Int32  # (N,) cells in the order in which the wave left them
+    marked: Bool  # (N,) cells at which it pauses
     clock: Int  # (3,) now, cells waiting, cells left
-
-
-class Steps(NamedTuple):
-    """The 26 steps on a grid laid flat."""
-
-    offset: Int  # (26,)
-    length: Int  # (26,) hundredths of a cell
-    climbs: Int  # (26,) 1: up or down, 0: level
-
-
-class Prices(NamedTuple):
-    """What ways cost by the kinds of their cells; no step costs more than `MOST_PRICE` times its length."""
-
-    cell: Float  # (K,) of a cell of each kind, 1 and more; 0: not passable
-    climb: Float  # (K,) factor on steps up or down to or from it
 
 
 def new_wave(cells: int) -> Wave:
     """A wave that has not begun; memory that it does not come to use costs nothing."""
-    cost = np.full(cells, FAR, np.int32)
-    following, before, order = (blank(cells, np.int32) for _ in range(3))
-    return Wave(cost, np.full(_BUCKETS, -1, np.int32), following, before, order, np.zeros(3, np.int64))
-
-
-def steps_on(shape: tuple[int, int, int]) -> Steps:
-    """The steps on a grid of this shape (margin included)."""
-    moves = np.array([m for m in np.ndindex(3, 3, 3) if m != (1, 1, 1)]) - 1
-    length = np.floor(UNIT * np.linalg.norm(moves, axis=1) + 0.5).astype(np.int64)
-    offset = moves @ np.array([shape[1] * shape[2], shape[2], 1])
-    return Steps(offset, length, np.abs(moves[:, 2]))
+    cost, marked = np.full(cells, FAR, np.int32), blank(cells, np.bool_)
+    following, before, came, order = (blank(cells, np.int32) for _ in range(4))
+    head = np.full(_BUCKETS, -1, np.int32)
+    return Wave(cost, head, following, before, came, order, marked, np.zeros(3, np.int64))
 
 
 @nb.njit(cache=True, inline="always")
-def _enter(wave: Wave, cell: int, cost: int) -> None:
-    """Give a cell this cost, and put it into the bucket of it."""
-    slot = cost & _RING
-    first = wave.head[slot]
-    wave.cost[cell], wave.following[cell], wave.before[cell] = cost, first, -1
+def _link(head: Int32, following: Int32, before: Int32, cell: int, slot: int) -> None:
+    """Put a cell into a bucket."""
+    first = head[slot]
+    following[cell], before[cell], head[slot] = first, -1, cell
     if first >= 0:
-        wave.before[first] = cell
-    wave.head[slot] = cell
-    wave.clock[_WAITING] += 1
+        before[first] = cell
 
 
 @nb.njit(cache=True, inline="always")
-def _remove(wave: Wave, cell: int) -> None:
-    """Take a waiting cell out of its bucket."""
-    ahead, behind = wave.before[cell], wave.following[cell]
+def _unlink(head: Int32, following: Int32, before: Int32, cell: int, slot: int) -> None:
+    """Take a cell out of its bucket."""
+    ahead, behind = before[cell], following[cell]
     if ahead >= 0:
-        wave.following[ahead] = behind
+        following[ahead] = behind
     else:
-        wave.head[wave.cost[cell] & _RING] = behind
+        head[slot] = behind
     if behind >= 0:
-        wave.before[behind] = ahead
-    wave.clock[_WAITING] -= 1
+        before[behind] = ahead
+
+
+@nb.njit(cache=True)
+def _wait(wave: Wave, cell: int, cost: int) -> None:
+    """Let a cell wait to be left, with this cost, in all directions."""
+    _link(wave.head, wave.following, wave.before, cell, cost & _RING)
+    wave.cost[cell], wave.came[cell] = cost, ANY_STEP
+    wave.clock[_WAITING] += 1
 
 
 @nb.njit(cache=True)
@@ -113,30 +98,53 @@ def begin(wave: Wave, source: int) -> None:
         wave.cost[cell] = FAR
     _empty_buckets(wave)
     wave.clock[:] = 0
-    _enter(wave, source, 0)
+    _wait(wave, source, 0)
 
 
-@nb.njit(cache=True, inline="always")
-def _step_cost(steps: Steps, n: int, price: Prices, here: int, there: int) -> int:
-    """What step number n costs between cells of these kinds; the first may be the source."""
-    mean = 0.5 * (max(price.cell[here], 1.0) + price.cell[there])
-    climb = max(price.climb[here], price.climb[there]) if steps.climbs[n] else 1.0
-    return int(min(mean * climb, MOST_PRICE) * steps.length[n])
+@nb.njit(cache=True)
+def _advance(wave: Wave, kind: UInt8, steps: Steps, price: Prices, most: int) -> int:
+    """Leave cells in the order of their costs up to `most`; the first marked one that was left, -1: none.
 
-
-@nb.njit(cache=True, inline="always")
-def _spread(wave: Wave, kind: UInt8, steps: Steps, price: Prices, at: int) -> None:
-    """Enter the neighbours of a cell that are reached at less cost over it."""
-    cost = wave.cost
-    for n in range(steps.offset.shape[0]):
-        near = at + steps.offset[n]
-        if price.cell[kind[near]] == 0.0:
+    Every array has a name of its own: looked up in their tuples, they cost more than all the rest.
+    """
+    cost, head, following, before, came, order, marked, clock = wave
+    offset, behind, needed, after, instead = steps
+    passable, toll, even = price.cell > 0.0, price.toll, price.even
+    now, waiting, left, paused = clock[_NOW], clock[_WAITING], clock[_LEFT], -1
+    while waiting > 0 and now <= most and paused < 0:
+        at = head[now & _RING]
+        if at < 0:
+            now += 1
             continue
-        reached = cost[at] + _step_cost(steps, n, price, kind[at], kind[near])
-        if reached < cost[near]:
-            if cost[near] < FAR:
-                _remove(wave, near)
-            _enter(wave, near, reached)
+        head[now & _RING] = following[at]
+        if following[at] >= 0:
+            before[following[at]] = -1
+        order[left] = at
+        waiting, left = waiting - 1, left + 1
+        if marked[at]:
+            paused = at
+        steps_to, here = came[at] if even else ANY_STEP, kind[at]
+        for last in range(behind.shape[0]):
+            if not steps_to >> last & 1:
+                continue
+            origin = at - behind[last]
+            for n in range(needed[last]):
+                step, spared = after[last, n], instead[last, n]
+                near = at + offset[step]
+                if not passable[kind[near]] or (spared >= 0 and passable[kind[origin + offset[spared]]]):
+                    continue
+                known, reached = cost[near], now + toll[here, kind[near], step]
+                if reached < known:
+                    if known < FAR:
+                        _unlink(head, following, before, near, known & _RING)
+                        waiting -= 1
+                    _link(head, following, before, near, reached & _RING)
+                    cost[near], came[near] = reached, 1 << step
+                    waiting += 1
+                elif reached == known:
+                    came[near] |= 1 << step
+    clock[_NOW], clock[_WAITING], clock[_LEFT] = now, waiting, left
+    return paused
 
 
 @nb.njit(cache=True)
@@ -151,19 +159,12 @@ def reach(wave: Wave, kind: UInt8, steps: Steps, price: Prices, goal: int, most:
         goal: cell.
         most: cost.
     """
-    cost = wave.cost
-    now = wave.clock[_NOW]
-    while wave.clock[_WAITING] > 0 and now < cost[goal] and now <= most:
-        at = wave.head[now & _RING]
-        if at < 0:
-            now += 1
-            continue
-        _remove(wave, at)
-        wave.order[wave.clock[_LEFT]] = at
-        wave.clock[_LEFT] += 1
-        _spread(wave, kind, steps, price, at)
-    wave.clock[_NOW] = now
-    return int(cost[goal]) if cost[goal] <= min(now, most) else FAR
+    if wave.cost[goal] > wave.clock[_NOW]:
+        wave.marked[goal] = True
+        _advance(wave, kind, steps, price, most)
+        wave.marked[goal] = False
+    cost = wave.cost[goal]
+    return int(cost) if cost <= min(wave.clock[_NOW], most) else FAR
 
 
 @nb.njit(cache=True)
@@ -205,30 +206,25 @@ def reach_nearest(
         groups: that are enough.
         spare: cost.
     """
-    cost, clock = wave.cost, wave.clock
+    cost, marked, now = wave.cost, wave.marked, wave.clock[_NOW]
     found, beside = np.full(places.shape[0], FAR), np.empty(places.shape[0], np.int64)
     tally = np.array([0, FAR])  # groups that have a place, cost over the best one
-    reached, least, now = np.zeros(places.shape[0], np.bool_), onward.min(), clock[_NOW]
+    reached, least = np.zeros(places.shape[0], np.bool_), onward.min()
     for p in range(places.shape[0]):
         beside[p], number[places[p]] = number[places[p]] - 1, p + 1  # places may share a cell
+        marked[places[p]] = True
         if cost[places[p]] <= now:
             _settle(p, cost[places[p]], group, onward, found, reached, tally)
-    while clock[_WAITING] > 0 and tally[0] < groups and now + least <= tally[1] + spare:
-        at = wave.head[now & _RING]
+    while tally[0] < groups:
+        at = _advance(wave, kind, steps, price, tally[1] + spare - least)
         if at < 0:
-            now += 1
-            continue
-        _remove(wave, at)
-        wave.order[clock[_LEFT]] = at
-        clock[_LEFT] += 1
+            break
         p = number[at] - 1
         while p >= 0:
-            _settle(p, now, group, onward, found, reached, tally)
+            _settle(p, cost[at], group, onward, found, reached, tally)
             p = beside[p]
-        _spread(wave, kind, steps, price, at)
-    clock[_NOW] = now
     for p in range(places.shape[0]):
-        number[places[p]] = 0
+        number[places[p]], marked[places[p]] = 0, False
     return found
 
 
@@ -260,9 +256,7 @@ def trace(wave: Wave, kind: UInt8, steps: Steps, price: Prices, goal: int) -> In
         before = count
         for n in range(steps.offset.shape[0]):
             near = at - steps.offset[n]
-            if cost[near] < cost[at] and (
-                cost[near] + _step_cost(steps, n, price, kind[near], kind[at]) == cost[at]
-            ):
+            if cost[near] < cost[at] and (cost[near] + price.toll[kind[near], kind[at], n] == cost[at]):
                 way[count] = at = near
                 count += 1
                 break
@@ -270,14 +264,11 @@ def trace(wave: Wave, kind: UInt8, steps: Steps, price: Prices, goal: int) -> In
 
 
 @nb.njit(cache=True)
-def forget(wave: Wave, kind: UInt8, steps: Steps, price: Prices, level: int) -> None:
+def forget(wave: Wave, level: int) -> None:
     """Take back every cost above the level and go on from there; what costs less must hold as it is.
 
     Args:
         wave: is changed.
-        kind: (N,) of each cell, as it is now.
-        steps: on the grid.
-        price: of each kind.
         level: cost; the source stays in any case.
     """
     order, cost, clock = wave.order, wave.cost, wave.clock
@@ -287,13 +278,11 @@ def forget(wave: Wave, kind: UInt8, steps: Steps, price: Prices, level: int) -> 
     while clock[_LEFT] > 1 and cost[order[clock[_LEFT] - 1]] > level:
         clock[_LEFT] -= 1
         cost[order[clock[_LEFT]]] = FAR
-    clock[_NOW] = cost[order[clock[_LEFT] - 1]]
-    first = clock[_LEFT]
-    longest = int(MOST_PRICE * 1.7321 * UNIT) + 1
-    while first > 0 and cost[order[first - 1]] >= clock[_NOW] - longest:
-        first -= 1
-    for at in order[first : clock[_LEFT]]:  # from these, steps lead beyond the level
-        _spread(wave, kind, steps, price, at)
+    last = cost[order[clock[_LEFT] - 1]]
+    while clock[_LEFT] > 0 and cost[order[clock[_LEFT] - 1]] >= last - _LONGEST:
+        clock[_LEFT] -= 1  # from here, steps lead beyond the level: it is left anew
+        clock[_NOW] = cost[order[clock[_LEFT]]]
+        _wait(wave, order[clock[_LEFT]], clock[_NOW])
 
 
 @nb.njit(cache=True)
