@@ -6,15 +6,17 @@
 Importing the package loads nothing heavy. It pins every thread pool to one thread, before
 numpy can start them: matrix products change bits between one thread and two, and a
 result must not depend on the machine's core count. It also tells numba which compiled
-kernels are stale (`uavexp.kernel_cache`).
+kernels are stale (`uavexp.kernel_cache`), and lets Ctrl-C end a command that still loads.
 """
 
 from __future__ import annotations
 
 import os
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from uavexp.interrupts import leave_at_once
 from uavexp.kernel_cache import LOCATOR, VARIABLE
 
 if TYPE_CHECKING:
@@ -43,6 +45,8 @@ _THREAD_VARIABLES = (
     "TBB_NUM_THREADS",
     "NUMBA_NUM_THREADS",
 )
+if sys.argv[:1] == ["-m"]:  # `python -m uavexp...`, while Python still looks for the command
+    leave_at_once()
 # overridden, not defaulted: a user's OMP_NUM_THREADS=2 would change results
 os.environ.update(dict.fromkeys(_THREAD_VARIABLES, "1"))
 os.environ[VARIABLE] = LOCATOR

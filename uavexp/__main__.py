@@ -24,6 +24,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     0; 1 a trial did not run to its end or the disk was full; 2 bad input; 130 interrupted.
     """
     os.environ["MPLBACKEND"] = "Agg"
+    leave_at_once()
     typed = sys.argv[1:] if arguments is None else arguments
     if typed[:1] == ["tune"]:
         from uavexp.tune.__main__ import main as tune
@@ -33,7 +34,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         from uavexp.benchmark.__main__ import main as benchmark
 
         return benchmark(typed[1:])
-    leave_at_once()
     return exit_code_of(lambda: _run(typed))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -33,3 +34,19 @@ def test_an_interrupt_of_a_whole_group_is_one_line(delay_s: float, tmp_path: Pat
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does: the fork server and the children, too
     _, error = process.communicate(timeout=120)
     assert (process.returncode, error) == (130, "interrupted\n")
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="reads /proc")
+@pytest.mark.parametrize("delay_s", [0.2, 1.0])
+@pytest.mark.parametrize("command", ["check", "export", "show"])
+def test_other_commands_that_still_load_end_in_one_line(command: str, delay_s: float) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-m", f"uavexp.{command}", "no_such_folder"], stderr=subprocess.PIPE, text=True
+    )
+    wait_until_it_hears(process)
+    time.sleep(delay_s)
+    was_running = process.poll() is None
+    process.send_signal(signal.SIGINT)
+    _, error = process.communicate(timeout=120)
+    if was_running and process.returncode != 2:
+        assert (process.returncode, error) == (130, "interrupted\n")

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Sequence
 
 from uavexp.errors import ConfigError
-from uavexp.interrupts import exit_code_of, leave_at_once
+from uavexp.interrupts import exit_code_of
 
 
 def run_or_explain(arguments: Sequence[str] | None, usage: str, run: Callable[[list[str]], int]) -> int:
@@ -24,7 +24,6 @@ def run_or_explain(arguments: Sequence[str] | None, usage: str, run: Callable[[l
     if is_asked or not typed:
         (sys.stdout if is_asked else sys.stderr).write(usage)
         return 0 if is_asked else 2
-    leave_at_once()
     return exit_code_of(lambda: run(typed))
 
 

@@ -25,7 +25,7 @@ from uavexp.config.overrides import parse_settings, quoted
 from uavexp.errors import ConfigError, WorldError, one_line
 from uavexp.formats import FREE, SOLID, UNMEASURED
 from uavexp.geometry import polyline_length_m
-from uavexp.interrupts import exit_code_of, leave_at_once
+from uavexp.interrupts import exit_code_of
 from uavexp.seeding import Stream, generator
 from uavexp.types import World
 from uavexp.world.file import File
@@ -70,7 +70,6 @@ class Understood:
 def main(typed: Sequence[str]) -> int:
     """Show a world and return the exit code: 0; 2 it cannot be read or has no task; 130 interrupted."""
     os.environ["MPLBACKEND"] = "Agg"
-    leave_at_once()
     if not typed or {"-h", "--help"} & set(typed):
         (sys.stdout if typed else sys.stderr).write(_USAGE)
         return 0 if typed else 2

@@ -19,7 +19,8 @@ def main(arguments: Sequence[str]) -> int:
 
 def _export(options: argparse.Namespace) -> int:
     trial = read_trial(options.trial)
-    out = options.out or Path(f"{trial.name}.{options.to}{FORMATS[options.to].suffix}")
+    tail = f".{options.to}".removesuffix(FORMATS[options.to].suffix) + FORMATS[options.to].suffix
+    out = options.out or Path(trial.name + tail)
     for path in export(trial, options.to, out):
         sys.stdout.write(f"{path}\n")
     return 0

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 
 from uavexp.errors import ConfigError
+from uavexp.interrupts import raise_from_now_on
 from uavexp.store.stored_trial import StoredTrial
+
+Write = Callable[[StoredTrial, Path], Sequence[Path]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +64,17 @@ def export(trial: StoredTrial, to: str, out: Path) -> Sequence[Path]:
         raise ConfigError(f"--out {out} exists already; a rosbag2 is a new folder: name another one")
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
-        paths: Sequence[Path] = module.write(trial, out)
+        raise_from_now_on()
+        return _written_whole(module.write, trial, out)
     except OSError as error:
         raise ConfigError(f"--out {out} cannot be written ({error.strerror or error})") from error
-    return paths
+
+
+def _written_whole(write: Write, trial: StoredTrial, out: Path) -> list[Path]:
+    """What was written: whole, or not there at all."""
+    with tempfile.TemporaryDirectory(dir=out.parent, prefix=f".{out.name}-") as folder:
+        made = write(trial, Path(folder) / out.name)
+        own = {path: out.parent / path.name for path in made if path.parent == Path(folder)}
+        for path, place in own.items():
+            path.replace(place)
+    return [own.get(path, path) for path in made]

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from uavexp.errors import ConfigError
-from uavexp.interrupts import Parser, exit_code_of, leave_at_once
+from uavexp.interrupts import Parser, exit_code_of
 from uavexp.judge.facts import as_json, lines_of, values_of
 from uavexp.judge.flight import Judged, Pose, judged
 from uavexp.judge.readers import READERS, read
@@ -21,7 +21,6 @@ from uavexp.store.records import write_bytes
 def main(arguments: Sequence[str]) -> int:
     """Judge one flight and return the exit code: 0; 1 the disk was full; 2 bad input; 130 interrupted."""
     os.environ["MPLBACKEND"] = "Agg"
-    leave_at_once()
     return exit_code_of(lambda: _judge(arguments))
 
 

@@ -15,7 +15,7 @@ from uavexp.config.composition import CELL_AXIS, Composer
 from uavexp.config.options import user_folder
 from uavexp.config.overrides import parse_settings
 from uavexp.errors import ConfigError, RecordError
-from uavexp.interrupts import Parser, exit_code_of, leave_at_once
+from uavexp.interrupts import Parser, exit_code_of
 from uavexp.judge.readers import told
 from uavexp.replay.asked import Asked, asked
 from uavexp.replay.recorded import Reading, Recorded
@@ -27,7 +27,6 @@ _NO_PART = ("seed", "out", "experiments", "experiment", "world", "mission", "mov
 def main(arguments: Sequence[str]) -> int:
     """Ask the policies and return the exit code: 0; 1 the disk was full; 2 bad input; 130 interrupted."""
     os.environ["MPLBACKEND"] = "Agg"
-    leave_at_once()
     return exit_code_of(lambda: _replay(arguments))
 
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from uavexp.errors import ConfigError
-from uavexp.interrupts import exit_code_of
+from uavexp.interrupts import exit_code_of, raise_from_now_on
 
 _USAGE = """usage: python -m uavexp.report DIR [DIR ...] [--pictures]
        python -m uavexp.report DIR --watch [--port=N]
@@ -81,6 +81,7 @@ def _make(names: Sequence[str], make: Callable[[Path], None]) -> int:
 def _draw(folder: Path) -> None:
     from uavexp.report.picture_files import draw_missing
 
+    raise_from_now_on()
     for path in draw_missing(folder):
         sys.stdout.write(f"{path}\n")
 
@@ -88,6 +89,7 @@ def _draw(folder: Path) -> None:
 def _report(folder: Path) -> None:
     from uavexp.report.make import make_report
 
+    raise_from_now_on()
     begin_s = time.monotonic()
 
     def tell(line: str) -> None:

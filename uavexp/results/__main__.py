@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from uavexp.errors import ConfigError
-from uavexp.interrupts import exit_code_of, leave_at_once
+from uavexp.interrupts import exit_code_of
 from uavexp.paths import checkout_root, outputs_root
 from uavexp.report.significance import ALPHA
 from uavexp.results.changes import Change, changes, verdict_changes
@@ -38,7 +38,6 @@ _SHOWN = 12  # changes of a study at the terminal; the file has all
 def main(arguments: Sequence[str] | None = None) -> int:
     """Fly what is asked and return the exit code: 0; 1 a command did not run to its end; 2 bad input."""
     os.environ["MPLBACKEND"] = "Agg"
-    leave_at_once()
     return exit_code_of(lambda: _run(sys.argv[1:] if arguments is None else arguments))
 
 

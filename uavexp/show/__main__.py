@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from uavexp.errors import ConfigError, RecordError
-from uavexp.interrupts import exit_code_of
+from uavexp.interrupts import exit_code_of, raise_from_now_on
 from uavexp.show.chosen import Chosen, chosen
 from uavexp.show.page import page_html
 from uavexp.store.records import write_bytes
@@ -43,6 +43,7 @@ def _write_page(flights: Chosen, file: Path, *, look: bool) -> None:
 def _write_film(flights: Chosen, file: Path) -> None:
     from uavexp.show.film import film_bytes
 
+    raise_from_now_on()
     _write(file, film_bytes(flights.trials[-1], file.suffix))
 
 
