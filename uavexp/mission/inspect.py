@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import field
+from dataclasses import field, replace
 from enum import StrEnum
 from typing import Annotated, Any, ClassVar
 
@@ -12,7 +12,6 @@ import numpy as np
 from uavexp.arrays import Float
 from uavexp.errors import WorldError, require
 from uavexp.explorer.base import Explorer
-from uavexp.geometry import yaw_of
 from uavexp.inspection.inspection_plan import (
     InspectionPlan,
     Settings,
@@ -28,12 +27,12 @@ from uavexp.log import Inspection
 from uavexp.mission import unforeseen
 from uavexp.mission.base import Flown
 from uavexp.mission.cells_seen import Coverage, reachable_m, visible_anywhere
+from uavexp.mission.eye import Eye, ImageEye, RayEye, SeenBy, lens_of
 from uavexp.mission.tour_guide import Look, TourGuide
 from uavexp.parameters import Count, NonNegative, Positive, Range, Share, between, option
 from uavexp.scene import Scene
+from uavexp.sensor.depth_camera import Pixels
 from uavexp.types import Limits, Observation, Outcome, ReferenceMap, World
-
-LOOK_S = 0.2  # between the instants at which the camera earns coverage
 
 
 class Tour(StrEnum):
@@ -67,6 +66,11 @@ class Inspect:
     vertical_fov_deg: Positive = 73.7  # deg, of the same [ours]
     range_m: Positive = 5.0  # m, farthest distance at which a cell counts as seen [ours]
     incidence_deg: Positive = 70.0  # deg, greatest angle of the line of sight to a cell's normal [ours]
+    seen_by: SeenBy = SeenBy.RAYS  # rays: a cell counts as seen when an ideal ray meets it; image: when
+    # a depth image shows it, with the noise and frame rate of sensor=rgbd and the vehicle's true attitude;
+    # the vehicle, too, then believes its images [ours]
+    image_width_px: Pixels = 96  # px, of that image, as of sensor=rgbd; its height follows from the
+    # angles [ours]
     cell_m: Positive = 0.2  # m, edge of the cells of the surface [ours]
     cell_tolerance_m: Positive = 0.15  # m, between a cell and the true surface that is seen in
     # its place [ours]
@@ -102,7 +106,8 @@ class Inspect:
     _visible: Any = field(init=False, repr=False)  # (N,) cells that can be seen in truth
     _true_coverage: Coverage = field(init=False, repr=False)  # of the true surface, blocks included
     _true_visible: Any = field(init=False, repr=False)  # (M,)
-    _scene: Scene = field(init=False, repr=False)
+    _eye: Eye = field(init=False, repr=False)
+    _rng: np.random.Generator = field(init=False, repr=False)  # of the images' noise
     _time_limit_s: float = field(init=False, repr=False, default=0.0)
     _next_look_s: float = field(init=False, repr=False, default=0.0)
 
@@ -116,6 +121,7 @@ class Inspect:
 
     def prepare(self, world: World, rng: np.random.Generator) -> World:
         """The world with blocks and without what is gone; its reference as it is known."""
+        self._rng = rng
         known = world.reference or ReferenceMap(
             vertices_m=world.vertices_m,
             triangles=world.triangles,
@@ -153,15 +159,9 @@ class Inspect:
         truth = reference_field(world.vertices_m, world.triangles, world.bounds_m)
         surface = surface_of_mesh(world.vertices_m, world.triangles, truth, world.start_m, self.cell_m)
         surface = upright(surface, settings.max_tilt_rad)  # what a level camera looks at, as of the plan's
-        self._scene = scene
+        self._eye = self._begin_eye(scene)
         self._coverage, self._true_coverage = (
-            Coverage(
-                surface=cells,
-                camera=camera,
-                tolerance_m=self.cell_tolerance_m,
-                seen_s=np.full(len(cells), np.inf),
-            )
-            for cells in (plan.surface, surface)
+            Coverage(surface=cells, seen_s=np.full(len(cells), np.inf)) for cells in (plan.surface, surface)
         )
         eyes_m = reachable_m(truth, world, self.clearance_m)
         self._visible, self._true_visible = (
@@ -174,6 +174,7 @@ class Inspect:
             settings=settings,
             look=self.look,
             view_adaptation=self.view_adaptation,
+            believes_rays=self.seen_by is SeenBy.RAYS,
             arrive_m=self.arrive_m,
             yaw_tolerance_rad=math.radians(self.yaw_tolerance_deg),
             dwell_s=self.dwell_s,
@@ -211,10 +212,12 @@ class Inspect:
         is_over = self._begun().finished
         for k, time_s in enumerate(flown.time_s[:1] if is_over else flown.time_s):
             if time_s >= self._next_look_s - 1e-9:
-                self._next_look_s += LOOK_S
-                yaw_rad = yaw_of(flown.quaternion_wxyz[k])
+                self._next_look_s += self._eye.period_s
+                self._eye.look(flown.position_m[k], flown.quaternion_wxyz[k], float(time_s))
                 for coverage in (self._coverage, self._true_coverage):
-                    coverage.look(self._scene, float(time_s), flown.position_m[k], yaw_rad)
+                    coverage.count(self._eye, float(time_s))
+                if self.seen_by is SeenBy.IMAGE:
+                    self._believe(flown.estimated_position_m[k] - flown.position_m[k])
         return (0, Outcome.INSPECTED) if is_over else None
 
     def findings(self) -> Inspection:
@@ -232,6 +235,20 @@ class Inspect:
             viewpoint_segment=viewpoints.segment[order],
             viewpoint_visited_s=guide.visited_s[order],
         )
+
+    def _believe(self, off_m: Float) -> None:
+        """Tell the guide what the last image shows to one who takes himself to be off by (3,)."""
+        guide = self._begun()
+        surface = replace(guide.plan.surface, point_m=guide.plan.surface.point_m - off_m)
+        guide.scanned[self._eye.sees(surface, ~guide.scanned)] = True
+
+    def _begin_eye(self, scene: Scene) -> Eye:
+        camera = self._camera()
+        if self.seen_by is SeenBy.RAYS:
+            return RayEye(scene=scene, camera=camera, tolerance_m=self.cell_tolerance_m)
+        lens = lens_of(camera, self.image_width_px)
+        lens.reset(scene, self._rng)
+        return ImageEye(lens=lens, camera=camera, tolerance_m=self.cell_tolerance_m)
 
     def _plan(self, world: World) -> InspectionPlan:
         """The plan on the reference map; without one, the truth is known."""

@@ -25,7 +25,7 @@ import numpy as np
 from uavexp.arrays import Bool, Float
 from uavexp.geometry import wrap_angle, yaw_of
 from uavexp.inspection.inspection_plan import InspectionPlan, Settings, adapt_order
-from uavexp.inspection.view_angle import Weights, cell_weights, choose_yaw
+from uavexp.inspection.view_angle import Weights, blocked_viewpoints, cell_weights, choose_yaw
 from uavexp.inspection.viewpoints import Viewpoints
 from uavexp.inspection.visibility import Camera, visible_cells
 from uavexp.mission.give_way import HORIZON_S, aside_m, room_along_m, rooms_m
@@ -64,6 +64,8 @@ class TourGuide:
         settings: of the plan, for more stops.
         look: where to between stops.
         view_adaptation: whether the yaw is chosen anew (paper 3, algorithm 2) or the planned one.
+        believes_rays: whether what a ray through the live map reaches counts as scanned; else `scanned`
+            is written by who takes the images.
         arrive_m: distance from a stop at which the vehicle has arrived.
         yaw_tolerance_rad: from the wanted yaw at which it has turned there.
         dwell_s: longest stay at a stop.
@@ -82,6 +84,7 @@ class TourGuide:
     settings: Settings
     look: Look
     view_adaptation: bool
+    believes_rays: bool
     arrive_m: float
     yaw_tolerance_rad: float
     dwell_s: float
@@ -135,7 +138,7 @@ class TourGuide:
 
         Between calls that are not `fresh` one period passes: then what the camera sees counts.
         """
-        if not fresh:
+        if not fresh and self.believes_rays:
             self._scan(observation)
         free: Free = cache(partial(self._is_free, observation))
         stop = self._next(observation, free)
@@ -303,9 +306,19 @@ class TourGuide:
         if not self.view_adaptation:
             return planned_rad
         surface, views = self.plan.surface, self.plan.views
-        weight = cell_weights(surface, views, self._blocked, self.scanned, self.weights)
+        blocked = self._blocked_now(observation)
+        weight = cell_weights(surface, views, blocked, self.scanned, self.weights)
         grid, position_m = live_grid(observation.field), observation.state.position_m
         return choose_yaw(grid, self.camera, surface, weight, position_m, planned_rad).yaw_rad
+
+    def _blocked_now(self, observation: Observation) -> Bool:
+        """Planned stops (V,) not visited that were blocked or unreachable, or are blocked by the live map.
+
+        All of them, not only those that come next: what they would have seen is to be seen from elsewhere.
+        """
+        places = self.plan.viewpoints
+        shown = blocked_viewpoints(observation.field, places, self.blocked_below_m)
+        return self._blocked | (shown & np.isinf(self.visited_s))
 
     def _newly_seen(self, observation: Observation, yaw_rad: float) -> Bool:
         """Cells (N,) not yet scanned that the camera would see from here with a yaw, by the live map."""

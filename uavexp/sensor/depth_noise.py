@@ -43,6 +43,16 @@ class DepthNoise(NamedTuple):
 
 
 @nb.njit(cache=True, error_model="numpy")
+def error_bound_m(depth_m: float, noise: DepthNoise) -> float:
+    """How far a measured depth may be off the true one: three sigma, and half a step of disparity there."""
+    off_m = depth_m - _BEST_M
+    bound_m = 3.0 * noise.axial * (_NEAREST_M + _GROWTH_PER_M * off_m * off_m)
+    if noise.disparity_unit_m > 0.0:
+        bound_m += 0.5 * depth_m * depth_m / noise.disparity_unit_m
+    return float(bound_m)
+
+
+@nb.njit(cache=True, error_model="numpy")
 def _drop_edges(
     before: Float32, here: Float32, after: Float32, uniform: Float32, noise: DepthNoise, measured: Float32
 ) -> None:

@@ -11,12 +11,14 @@ import pytest
 from tests.inspections import START_M, boxes, building, surface_in
 from tests.logs import make_log, make_world
 from uavexp.arrays import Bool, Float
+from uavexp.geometry import quaternion_from_yaw
 from uavexp.inspection.reference_surface import Surface, reference_field
 from uavexp.inspection.visibility import Camera
 from uavexp.log import TrialLog
 from uavexp.metrics import coverage as figures
 from uavexp.metrics.metric import Flight, measured
-from uavexp.mission.cells_seen import Coverage, is_met, reachable_m, visible_anywhere
+from uavexp.mission.cells_seen import Coverage, reachable_m, visible_anywhere
+from uavexp.mission.eye import RayEye, is_met
 from uavexp.scene import Scene
 from uavexp.types import Bodies, Outcome, Shape, World
 
@@ -70,14 +72,20 @@ def test_a_person_hides_exactly_its_shadow(scene: Scene) -> None:
 
 def test_only_what_is_framed_counts_and_the_first_time_stays(scene: Scene) -> None:
     camera, cells = Camera(max_incidence_rad=math.radians(80.0)), wall_cells()
-    seen = Coverage(surface=cells, camera=camera, tolerance_m=0.15, seen_s=np.full(len(cells), np.inf))
-    seen.look(scene, 1.0, EYE_M, math.pi)
+    eye = RayEye(scene=scene, camera=camera, tolerance_m=0.15)
+    seen = Coverage(surface=cells, seen_s=np.full(len(cells), np.inf))
+
+    def look(time_s: float, yaw_rad: float) -> None:
+        eye.look(EYE_M, quaternion_from_yaw(yaw_rad), time_s)
+        seen.count(eye, time_s)
+
+    look(1.0, math.pi)
     assert np.isinf(seen.seen_s).all()
-    seen.look(scene, 2.0, EYE_M, 0.0)
+    look(2.0, 0.0)
     x, y, z = (cells.point_m - EYE_M).T
     framed = (np.abs(y) <= x) & (np.abs(z) <= math.tan(0.5 * camera.vertical_fov_rad) * x)
     np.testing.assert_array_equal(np.isfinite(seen.seen_s), framed)
-    seen.look(scene, 3.0, EYE_M, 0.3)
+    look(3.0, 0.3)
     assert (seen.seen_s[framed] == 2.0).all()
     assert (seen.seen_s == 3.0).any()
 

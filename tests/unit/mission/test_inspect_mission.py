@@ -18,8 +18,10 @@ from uavexp.field import OCCUPIED, DistanceField
 from uavexp.geometry import quaternion_from_yaw
 from uavexp.inspection.inspection_plan import nearest_order
 from uavexp.inspection.travel import travel_matrix
+from uavexp.inspection.view_angle import blocked_viewpoints, cell_weights, choose_yaw
 from uavexp.mission.base import Flown
 from uavexp.mission.inspect import Inspect
+from uavexp.mission.more_stops import live_grid
 from uavexp.mission.tour_guide import TourGuide
 from uavexp.scene import Scene
 from uavexp.types import Goal, Observation, Outcome, State, World
@@ -68,6 +70,18 @@ def flown(*times_s: float) -> Flown:
 def seen_at(time_s: float, here: State, field: DistanceField = HALL.field) -> Observation:
     observation = observe(field, change(field, field), time_s=time_s)
     return replace(observation, state=here, flight_bounds_m=HALL.flight_bounds_m, time_s=time_s)
+
+
+def with_balls(places_m: np.ndarray) -> DistanceField:
+    """The hall's field with a ball of 0.25 m at each of the places (N, 3)."""
+    live = HALL.field
+    distance, state = live.distance.copy(), live.state.copy()
+    centres = live.voxel_centres_m(np.arange(live.distance.size))
+    for place in places_m:
+        ball = (np.linalg.norm(centres - place, axis=1) < 0.25).reshape(live.distance.shape)
+        state[ball] = OCCUPIED
+        distance[ball] = -0.05
+    return replace(live, distance=distance, state=state)
 
 
 def visit(guide: TourGuide, field: DistanceField = HALL.field, limit: int = 4000) -> list[Goal]:
@@ -134,19 +148,36 @@ def test_all_goals_rejected_twice_end_the_inspection() -> None:
 
 def test_viewpoints_that_the_live_map_blocks_are_left_out() -> None:
     _, guide = begun(rounds=0)
-    live = HALL.field
-    distance, state = live.distance.copy(), live.state.copy()
     places = guide.plan.viewpoints.position_m
     near = np.linalg.norm(places - places[guide.plan.order[1]], axis=1) < 0.5
-    centres = live.voxel_centres_m(np.arange(live.distance.size))
-    for place in places[near]:
-        ball = (np.linalg.norm(centres - place, axis=1) < 0.25).reshape(live.distance.shape)
-        state[ball] = OCCUPIED
-        distance[ball] = -0.05
-    goals = visit(guide, replace(live, distance=distance, state=state))
+    goals = visit(guide, with_balls(places[near]))
     assert np.isinf(guide.visited_s[near]).all()
     assert np.isfinite(guide.visited_s[~near]).all()
     assert not any((goal.position_m == places[near]).all(axis=1).any() for goal in goals)
+
+
+def test_all_blocked_viewpoints_gain_weight_not_only_the_next() -> None:
+    """The view is that of algorithm 2 with every viewpoint on which the live map shows an obstacle."""
+    _, guide = begun(rounds=0, occluded_weight=50.0, look="adaptive")
+    plan, first = guide.plan, guide.plan.order[0]
+    live = with_balls(plan.viewpoints.position_m[plan.order[-3:]])
+    blocked = blocked_viewpoints(live, plan.viewpoints, 0.3)
+    assert not blocked[first], "the next one is free"
+    assert blocked[plan.order[-3:]].all()
+
+    def best(here: Observation, blocked: np.ndarray) -> float:
+        weight = cell_weights(plan.surface, plan.views, blocked, guide.scanned, guide.weights)
+        nominal_rad, place_m = float(plan.viewpoints.yaw_rad[first]), here.state.position_m
+        return choose_yaw(live_grid(live), guide.camera, plan.surface, weight, place_m, nominal_rad).yaw_rad
+
+    differs = 0
+    for time_s, x_m in enumerate((1.0, 1.5, 2.0, 2.5)):
+        here = seen_at(float(time_s), state(np.array([x_m, 3.2, 1.3])), live)
+        chosen = guide.select(here)
+        assert chosen is not None
+        assert chosen.yaw_rad == best(here, blocked)
+        differs += chosen.yaw_rad != best(here, np.zeros_like(blocked))
+    assert differs, "and it matters here"
 
 
 def test_the_mission_ends_with_the_visit_and_reports_what_was_seen() -> None:
