@@ -142,12 +142,18 @@ class Frontier3d:
         if self._choice is not None and not self._is_open(space, self._choice):
             self._choice = None
         choice = self._choice
-        due = choice is None or now_s - choice.made_s >= self.rethink_s - 1e-9
-        if fresh or choice is None or due or leg_is_done(here_m, choice.leg_m, choice.place_m):
+        age_s = math.inf if choice is None else now_s - choice.made_s
+        if choice is not None and (age_s == 0.0 or not self._is_due(choice, age_s, here_m, fresh=fresh)):
+            space.ways.measure()
+        else:
             prices = optimistic(self.unseen_price, self.unseen_climb)
             space = self._space = space.updated(observation.target_m, prices)
             choice = self._choice = self._chosen(space, observation)
         return self._last_resort(observation) if choice is None else self._goal(choice, here_m)
+
+    def _is_due(self, choice: _Choice, age_s: float, here_m: Float, *, fresh: bool) -> bool:
+        """Whether all goals are to be compared again."""
+        return fresh or age_s >= self.rethink_s - 1e-9 or leg_is_done(here_m, choice.leg_m, choice.place_m)
 
     def _goal(self, choice: _Choice, here_m: Float) -> Goal:
         """The end of the leg; near to the place, the yaw is that with which it shows most."""

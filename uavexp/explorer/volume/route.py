@@ -28,7 +28,6 @@ _LONGER, _FARTHER_M = 1.3, 1.5  # ways between places are sought up to so many s
 _KICKS_PER_PLACE = 1
 PLACES = 12  # that a tour visits, the nearest; farther ones wait for the next
 _MEMORY = 20_000  # pairs
-_MEASURED = 1  # places from which ways are sought at one time; those of others wait for the next choice
 _NARROW_PRICE = 3.0
 # prices of the kinds of cells on ways over what was seen: without narrow places, with them, and with
 # places of which not all around was seen, as that of the start
@@ -69,6 +68,7 @@ class Ways:
     _beyond: Wave = field(init=False, repr=False)
     _number: Int32 = field(init=False, repr=False)
     _between: dict[tuple[int, int], float] = field(init=False, repr=False, default_factory=dict)
+    _asked: list[tuple[int, Int, Float]] = field(init=False, repr=False, default_factory=list)
 
     def __post_init__(self) -> None:
         size = self.cells.kind.size
@@ -150,15 +150,13 @@ class Ways:
         straight = np.linalg.norm(middle[:, None] - middle, axis=2)
         if len(self._between) > _MEMORY:
             self._between.clear()
-        unknown: list[tuple[int, Int]] = []
+        self._asked = []
         for a in range(count):
             near = np.argsort(straight[a], kind="stable")[1 : _NEAREST + 1]
             missing = [int(b) for b in near if not self._knows(int(places[a]), int(places[b]))]
             if missing:  # two places may share a cell
-                unknown.append((a, np.array(missing)))
-        for a, ends in unknown[:_MEASURED]:
-            most_m = np.minimum(over[a, ends], _LONGER * straight[a, ends] + _FARTHER_M)
-            self._measure(int(places[a]), places[ends], most_m)
+                most_m = np.minimum(over[a, missing], _LONGER * straight[a, missing] + _FARTHER_M)
+                self._asked.append((int(places[a]), places[missing], most_m))
         for a, b in np.argwhere(~np.eye(count, dtype=np.bool_)):
             known_m = self._between.get((int(places[a]), int(places[b])), np.inf)
             over[a, b] = over[b, a] = min(over[a, b], known_m)
@@ -177,9 +175,14 @@ class Ways:
             self._between[start, end] = self._between[end, start] = cost * cells.cell_m / UNIT
         return cost < FAR
 
-    def _measure(self, start: int, ends: Int, most_m: Float) -> None:
-        """Note the lengths of ways from one place to others, as far as they are no longer than `most_m`."""
-        cells = self.cells
+    def measure(self) -> None:
+        """Seek the ways from one more place to others that the last tour asked for, and note their lengths.
+
+        Not while a tour is chosen: that takes long enough.
+        """
+        if not self._asked:
+            return
+        (start, ends, most_m), cells = self._asked.pop(0), self.cells
         begin(self._other, start)
         most = int(most_m.max() / cells.cell_m * UNIT) + 1
         cost = reach_all(self._other, cells.kind, cells.steps, self._known, ends, most)

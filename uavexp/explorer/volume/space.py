@@ -79,9 +79,9 @@ class Space:
         there_m = np.full(len(group), np.inf)
         if open_.any():
             places = np.concatenate([cluster.eyes for cluster in seen])[open_]
-            tours = self.ways.target is None
+            tours, waiting = self.ways.target is None, len(np.unique(group[open_]))
             there_m[open_] = self.ways.nearest_m(
-                places, group[open_], onward_m[group[open_]], PLACES if tours else len(seen) + 1,
+                places, group[open_], onward_m[group[open_]], min(PLACES, waiting) if tours else waiting,
                 np.inf if tours else spare_m,
             )  # fmt: skip
         parts = np.split(there_m, np.cumsum(counts)[:-1]) if seen else []

@@ -98,8 +98,8 @@ class Viewpoints:
         middle = int(np.argmin(((centre_m - mean_m) ** 2).sum(axis=1)))
         sample = centre_m[np.linspace(0, len(members) - 1, min(len(members), _SAMPLE)).astype(int)]
         eyes_m = np.concatenate([mean_m + _OFFSETS, here_m[None]])
-        count, yaws = look_from(self._places, self._sight, eyes_m, sample)
-        good = np.flatnonzero((count > 0) & (count >= _NEAR_BEST * count.max()))
+        count, yaws = look_from(self._places, self._sight, eyes_m, sample, _NEAR_BEST)
+        good = np.flatnonzero(count)
         good = good[np.argsort(-count[good], kind="stable")][:_KEPT]
         return Cluster(
             cells=members,

@@ -122,12 +122,27 @@ def seen_from(places: Places, sight: Sight, eye: Float, yaw: float, cells_m: Flo
 
 
 @nb.njit(cache=True)
-def look_from(places: Places, sight: Sight, eyes: Float, cells_m: Float) -> tuple[Int, Float]:
+def _seen_enough(places: Places, sight: Sight, eye: Float, yaw: float, cells_m: Float, enough: float) -> int:
+    """How many of cells (C, 3) would be seen from an eye (3,); -1: fewer than enough."""
+    framed = np.zeros(cells_m.shape[0], dtype=np.bool_)
+    for c in range(cells_m.shape[0]):
+        framed[c] = _frames(sight, eye, yaw, cells_m[c])
+    count = framed.sum()
+    for c in range(cells_m.shape[0]):
+        if count < enough:
+            return -1
+        count -= framed[c] and not _sees(places, eye, cells_m[c])
+    return int(count) if count >= enough else -1
+
+
+@nb.njit(cache=True)
+def look_from(places: Places, sight: Sight, eyes: Float, cells_m: Float, share: float) -> tuple[Int, Float]:
     """How many of cells (C, 3) would be seen from each eye (E, 3), and with which yaw (E,).
 
-    The yaw is towards the middle of the cells. No eye where the body may not wait sees any.
+    The yaw is towards the middle of the cells. No eye where the body may not wait sees any, nor one that sees
+    less than this share of what the best does.
     """
-    count, yaws = np.zeros(eyes.shape[0], dtype=np.int64), np.zeros(eyes.shape[0])
+    count, yaws, most = np.zeros(eyes.shape[0], dtype=np.int64), np.zeros(eyes.shape[0]), 1
     for e in range(eyes.shape[0]):
         eye = eyes[e]
         if not is_place(places, eye[0], eye[1], eye[2]):
@@ -138,8 +153,9 @@ def look_from(places: Places, sight: Sight, eyes: Float, cells_m: Float) -> tupl
             level = max(math.hypot(dx, dy), 1e-6)
             x, y = x + dx / level, y + dy / level
         yaws[e] = math.atan2(y, x)
-        count[e] = seen_from(places, sight, eye, yaws[e], cells_m).sum()
-    return count, yaws
+        count[e] = _seen_enough(places, sight, eye, yaws[e], cells_m, share * most)
+        most = max(most, count[e])
+    return np.where(count >= share * most, count, 0), yaws
 
 
 def offsets_around() -> Float:
