@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -97,10 +98,21 @@ def test_a_terminal_that_closes_leaves_the_tables(tmp_path: Path) -> None:
     assert (out / "trials.parquet").is_file()
 
 
-def test_what_a_killed_command_left_in_the_temporary_folder_goes_with_the_next(tmp_path: Path) -> None:
-    code = "from uavexp.sweep.fork_server import start_fork_server as f; f(); import os, signal; {}"
-    for last in ("os.kill(os.getpid(), signal.SIGKILL)", "pass"):
-        more = {"TMPDIR": str(tmp_path)}
-        subprocess.run([sys.executable, "-c", code.format(last)], env=variables(**more), timeout=120)
-        left = os.listdir(tmp_path)
-        assert len(left) == (1 if "kill" in last else 0)
+START = "from uavexp.sweep.fork_server import start_fork_server as f; f(); import os, signal; {}"
+
+
+def test_what_a_killed_command_left_in_the_temporary_folder_goes_with_the_next() -> None:
+    with tempfile.TemporaryDirectory() as place:  # of a shorter name than `tmp_path`
+        for last in ("os.kill(os.getpid(), signal.SIGKILL)", "pass"):
+            command = [sys.executable, "-c", START.format(last)]
+            subprocess.run(command, env=variables(TMPDIR=place), timeout=120)
+            assert len(os.listdir(place)) == (1 if "kill" in last else 0)
+
+
+def test_a_temporary_folder_of_any_length_is_none_too_long(tmp_path: Path) -> None:
+    """A socket's name in it had more than its 107 bytes: no sweep could begin where TMPDIR is deep."""
+    (deep := tmp_path / ("a" * 90)).mkdir()
+    command = [sys.executable, "-c", START.format("pass")]
+    done = subprocess.run(command, env=variables(TMPDIR=str(deep)), capture_output=True, timeout=120)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert not os.listdir(deep)

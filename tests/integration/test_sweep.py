@@ -225,7 +225,7 @@ def test_a_trial_that_fails_costs_itself_alone_and_is_flown_again(tmp_path: Path
     folder = tmp_path / "study"
     deeds = "trigger.deed=raise,segfault,kill,hog,sleep,print"
     typed = (*FAULTY, *QUICK, "trigger=faulty", deeds, "seed=0", f"out={folder}")
-    runner = ("runner.timeout_s=12", "runner.memory_mb=1500")
+    runner = ("runner.timeout_s=20", "runner.memory_mb=1500")
     done = run(*typed, *runner, **TRUST)
     assert done.returncode == 1
     assert done.stderr == ""

@@ -27,6 +27,10 @@ LOST = 255  # exit code that multiprocessing gives a child whose fork server has
 _TETHER = "uavexp.sweep.tether"
 _FOLDER = "uavexp-{}-"  # of the process of that number
 _LEFT = re.compile(r"uavexp-(\d+)-\w+")
+_SHORT = Path("/tmp")  # where a socket's name is not too long
+_LONGEST = 107 - len(
+    "/uavexp-4194304-12345678/listener-12345678"
+)  # of a folder for one: a socket's has 107 bytes
 
 
 def start_fork_server(preload: Sequence[str] = ()) -> None:
@@ -126,13 +130,14 @@ def _take_folder() -> None:
     if config.get("tempdir") is not None:
         return
     root = Path(tempfile.gettempdir())
+    root = root if len(os.fsencode(root)) <= _LONGEST else _SHORT
     for folder in root.glob(_FOLDER.format("*") + "*"):
         match = _LEFT.fullmatch(folder.name)
         with contextlib.suppress(OSError):
             if match and folder.lstat().st_uid == os.getuid() and not _is_running(int(match[1])):
                 shutil.rmtree(folder, ignore_errors=True)
     with refusals_told():
-        config["tempdir"] = tempfile.mkdtemp(prefix=_FOLDER.format(os.getpid()))
+        config["tempdir"] = tempfile.mkdtemp(prefix=_FOLDER.format(os.getpid()), dir=root)
     util.Finalize(None, shutil.rmtree, args=[config["tempdir"], True], exitpriority=-100)
 
 
