@@ -40,8 +40,7 @@ TRUST = {"UAVEXP_TRUST": "tests"}
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The study, flown by two workers and left alone."""
     folder = tmp_path_factory.mktemp("undisturbed") / "study"
-    done = run(*STUDY, "runner.n_jobs=2", f"out={folder}")
-    assert done.returncode == 0, done.stderr
+    assert main([*STUDY, "runner.n_jobs=2", f"out={folder}"]) == 0
     return folder
 
 
@@ -175,8 +174,7 @@ def test_parts_of_one_experiment_join_in_any_order(
 
 def test_one_trial_keeps_the_limits_of_all_trials(tmp_path: Path) -> None:
     """Used to be flown in the command's own process, without any."""
-    done = run(*QUICK, "seed=0", "runner.timeout_s=0.01", f"out={tmp_path / 'study'}")
-    assert done.returncode == 1, done.stderr
+    assert main([*QUICK, "seed=0", "runner.timeout_s=0.01", f"out={tmp_path / 'study'}"]) == 1
     (row,) = read_study(tmp_path / "study").trials.to_dict("records")
     assert row["status"] == "hung"
 
