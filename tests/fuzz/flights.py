@@ -27,7 +27,7 @@ from uavexp.sweep.local import run_local
 from uavexp.sweep.trial_job import TrialJob, fly_job
 
 LIMITS = Allowance(timeout_s=120.0, memory_mb=4000.0)
-_DRAWN_EACH = 4  # a picture costs more than its flight
+_DRAWN_EACH = 10  # a picture costs more than its flight
 _SHORT = 0.1  # s, and s a metre, square metre or viewpoint
 _DURATIONS = {
     "explore": ("time_base_s", "time_per_area_spm2"),
