@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 
 import numpy as np
@@ -36,9 +37,19 @@ def ask(
     )
 
 
+@functools.cache
+def _hall() -> DistanceField:
+    return field_from(empty((12.0, 9.0, 6.0)))
+
+
+@functools.cache
+def _shelves(seed: int) -> DistanceField:
+    return field_from(warehouse(seed))
+
+
 def in_empty_space() -> list[PlanRequest]:
     """From rest and from flight through a hall in which nothing is mapped, to the target and past a goal."""
-    field = field_from(empty((12.0, 9.0, 6.0)))
+    field = _hall()
     start, goal = np.array([3.03, 4.41, 3.02]), np.array([8.87, 5.12, 3.13])
     slow = np.array([0.5, -0.3, 0.1])
     return [
@@ -50,7 +61,7 @@ def in_empty_space() -> list[PlanRequest]:
 
 def among_shelves(seed: int, count: int) -> list[PlanRequest]:
     """Requests of 4 to 12 m in a warehouse, half of them at speed with room to stop."""
-    field, rng = field_from(warehouse(seed)), np.random.default_rng(seed)
+    field, rng = _shelves(seed), np.random.default_rng(seed)
     requests: list[PlanRequest] = []
     while len(requests) < count:
         ends = rng.uniform([1.0, 1.0, 1.1], [25.0, 15.0, 1.6], (2, 3))
