@@ -94,8 +94,22 @@ def test_the_page_of_flights_shows_them_without_a_complaint(
     page = study.folder / "show.html"
     if not page.is_file():
         assert show([str(study.folder), "--out", str(page)]) == 0
-    seen = browser.look(page.as_uri(), width_px=width_px, settle_s=0.5)
+    inside = """(() => {
+      const data = JSON.parse(document.getElementById('flights').textContent);
+      const scenes = [...document.querySelectorAll('.scene')];
+      return data.flights.every((flight, n) => {
+        const { clientWidth: width, clientHeight: height } = scenes[n], view = camera.matrix(width / height);
+        const points = [...Array(flight.path.length / 3).keys()].map(k => flight.path.slice(3 * k, 3 * k + 3));
+        return [data.target, ...points].every(point => {
+          const [x, y] = camera.pixel(view, point, width, height);
+          return x > 0 && y > 0 && x < width && y < height;
+        });
+      });
+    })()"""
+    ready = "new Promise(done => setInterval(() => document.body.dataset.ready && done(true), 50))"
+    seen = browser.look(page.as_uri(), width_px=width_px, settle_s=0.1, ask=(ready, inside))
     (shots / f"show-{width_px}.png").write_bytes(seen.png)
+    assert seen.answers == [True, True]  # it begins with all of every flight in view
     assert seen.errors == []
     assert seen.outside == []
     assert seen.overflow_px <= 0

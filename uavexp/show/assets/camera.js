@@ -32,9 +32,22 @@ const camera = (() => {
     return w < 0.05 ? null : [(0.5 + (0.5 * row(0)) / w) * width, (0.5 - (0.5 * row(1)) / w) * height];
   }
 
-  function fit(low, high) {
-    at.middle = low.map((value, k) => (value + high[k]) / 2);
-    at.distance = Math.max(3, 1.05 * Math.hypot(...high.map((value, k) => value - low[k])));
+  // so near that every point is just in view, with some room, on canvases of these widths over heights
+  function fit(points, aspects) {
+    const ROOM = 0.8, { right, up, back } = axes(), f = 1 / Math.tan(FIELD / 2);
+    const along = (axis, point) => axis.reduce((sum, value, k) => sum + value * (point[k] - at.middle[k]), 0);
+    const ends = (values) => values.reduce(([low, high], v) => [Math.min(low, v), Math.max(high, v)], [values[0], values[0]]);
+    const half = (values) => (ends(values)[0] + ends(values)[1]) / 2;
+    const needed = (point, aspect) => {
+      const fy = f * Math.min(1, aspect), aside = Math.max(Math.abs(along(right, point)) / aspect, Math.abs(along(up, point)));
+      return along(back, point) + (fy * aside) / ROOM;
+    };
+    at.middle = [0, 1, 2].map((k) => half(points.map((point) => point[k])));
+    for (let turn = 0; turn < 4; turn++) { // what is near looks larger: move until above and below are alike
+      at.distance = Math.max(3, ...aspects.map((aspect) => ends(points.map((point) => needed(point, aspect)))[1]));
+      const shift = turn < 3 ? at.distance * half(points.map((point) => along(up, point) / (at.distance - along(back, point)))) : 0;
+      at.middle = at.middle.map((value, k) => value + shift * up[k]);
+    }
   }
 
   function listen(element, redraw) {

@@ -275,21 +275,15 @@
     }
   }
 
-  const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
-  for (const flight of data.flights) {
-    flight.path.forEach((value, n) => {
-      low[n % 3] = Math.min(low[n % 3], value);
-      high[n % 3] = Math.max(high[n % 3], value);
-    });
-  }
-  if (data.target) data.target.forEach((value, k) => { low[k] = Math.min(low[k], value); high[k] = Math.max(high[k], value); });
-  camera.fit(low.map((value, k) => value - (k < 2 ? 1.5 : 0)), high.map((value, k) => value + (k < 2 ? 1.5 : 0)));
   cut.max = Math.max(...data.flights.map((flight) => flight.map.top_m));
   cut.min = Math.min(...data.flights.map((flight) => flight.map.origin_m[2]));
   cut.value = data.cut_m;
   time.max = data.end_s;
   const views = [];
   for (const flight of data.flights) views.push(await makeView(flight));
+  const points = data.target ? [data.target] : [];
+  for (const { path } of data.flights) for (let n = 0; n < path.length; n += 3) points.push(path.slice(n, n + 3));
+  camera.fit(points, views.map(({ scene }) => scene.clientWidth / scene.clientHeight));
   legend();
   if (views.some((view) => !view.painter)) byId("no-webgl").hidden = false;
   play.addEventListener("click", toggle);
