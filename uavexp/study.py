@@ -31,8 +31,9 @@ class Study(store.Study):
     """
 
     def __repr__(self) -> str:
-        axes = ", ".join(f"{len(values)} {axis}" for axis, values in self.axes.items())
-        return f"Study({self.name or self.folder}: {axes or 'one cell'}, {len(self.seeds)} seeds)"
+        axes = [f"{len(values)} {axis}{'s' * (len(values) != 1)}" for axis, values in self.axes.items()]
+        seeds = f"{len(self.seeds)} seed{'s' * (len(self.seeds) != 1)}"
+        return f"Study({self.name or self.folder}: {', '.join([*(axes or ['1 cell']), seeds])})"
 
     @property
     def arms(self) -> tuple[str, ...]:

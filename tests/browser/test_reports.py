@@ -99,7 +99,8 @@ def test_the_page_of_flights_shows_them_without_a_complaint(
       const scenes = [...document.querySelectorAll('.scene')];
       return data.flights.every((flight, n) => {
         const { clientWidth: width, clientHeight: height } = scenes[n], view = camera.matrix(width / height);
-        const points = [...Array(flight.path.length / 3).keys()].map(k => flight.path.slice(3 * k, 3 * k + 3));
+        const rows = [...Array(flight.path.length / 3).keys()];
+        const points = rows.map(row => flight.path.slice(3 * row, 3 * row + 3));
         return [data.target, ...points].every(point => {
           const [x, y] = camera.pixel(view, point, width, height);
           return x > 0 && y > 0 && x < width && y < height;

@@ -7,9 +7,11 @@ from collections.abc import Sequence
 
 from rich.table import Table
 
+from uavexp.causes import OTHER
 from uavexp.store.table import Row
 
 _CAUSES = "replans_"
+_NAMED = {OTHER.name: "by the pilot"}  # column replans_other
 
 
 def trial_table(rows: Sequence[Row], axes: Sequence[str]) -> Table:
@@ -97,5 +99,5 @@ def _replans(row: Row) -> str:
         for name, count in sorted(row.items())
         if name.startswith(_CAUSES) and isinstance(count, int) and count  # rates and shares are no counts
     }
-    words = ", ".join(f"{count} {cause}" for cause, count in causes.items())
+    words = ", ".join(f"{count} {_NAMED.get(cause, cause)}" for cause, count in causes.items())
     return f"{row['replans']}" + (f" ({words})" if words else "")

@@ -49,7 +49,8 @@ def lines_of(found: Judged, values: dict[str, float]) -> list[str]:
     for column, value in values.items():
         if math.isfinite(value):
             metric = metric_of(column)
-            lines.append(f"  {metric.label:<36} {metric.scale * value:.{metric.digits}f}")
+            digits = 0 if metric.is_count else metric.digits
+            lines.append(f"  {metric.label:<36} {metric.scale * value:.{digits}f}")
     steps, window = found.log.steps, window_s(found.log)
     straight_m = polyline_length_m(steps.position_m[[0, -1]])
     lines.append(f"  {'From first to last position [m]':<36} {straight_m:.1f}")

@@ -35,7 +35,10 @@ def png_of(found: Sequence[Asked], title: str) -> bytes:
         curve.set(xlabel="time [s]", ylabel="least clearance ahead [m]")
         curve.grid(visible=True)
         causes = list(dict.fromkeys(request.cause for policy in found for request in policy.replans))
-        figure.suptitle(f"{title}\nwould have replanned; {replan_marks.causes_key(causes)}", fontsize=9)
+        figure.suptitle(
+            f"{title}\nwhen each policy would have replanned; cause {replan_marks.causes_key(causes)}",
+            fontsize=9,
+        )
         if len(first.tick_s):
             curve.set_xlim(0.0, float(np.max(first.tick_s)))
         picture = io.BytesIO()

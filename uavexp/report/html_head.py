@@ -33,7 +33,10 @@ def head(report: Report, shown: str) -> str:
     facts = [
         ("Paper", _linked(citation(report.study.name))),
         ("Flown", escape(" ".join(report.results.notes))),
-        *((axis, escape(", ".join(values))) for axis, values in report.study.axes.items()),
+        *(
+            (axis.capitalize(), escape(", ".join(filter(None, values))))
+            for axis, values in report.study.axes.items()
+        ),
         ("Date", escape(_dates(runs))),
         ("Version", escape(_versions(report.results, runs))),
         ("Machine", escape("; ".join(dict.fromkeys(map(_machine, runs))))),
@@ -49,7 +52,7 @@ def head(report: Report, shown: str) -> str:
 def _found(report: Report) -> Iterator[str]:
     """The verdict: on the paper's claims, and how many flights of each arm succeeded."""
     if report.judgements:
-        yield f"Claims of the paper: {counted(report.judgements)}."
+        yield f"Claims{' of the paper' * bool(citation(report.study.name))}: {counted(report.judgements)}."
     panel = report.results.panel
     rates = {arm: estimate(panel, RATE, arm) for arm in panel.arms}
     named = list(rates)

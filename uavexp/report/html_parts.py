@@ -43,7 +43,7 @@ def verdicts(claims: Sequence[Judgement]) -> str:
         f"<td>{escape(one.evidence)}</td><td>{escape(one.source)}</td></tr>"
         for one in claims
     )
-    head = ("claim", "verdict", "evidence", "where the paper says so")
+    head = ("claim", "verdict", "evidence", "source")
     return f"<p>{counted(claims)}.</p>\n" + grid(head, rows, table_class="claims")
 
 

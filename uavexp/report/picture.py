@@ -90,11 +90,14 @@ def _draw_clearance(axes: Axes, log: TrialLog, safety_threshold_m: float, near_m
     stride = max(1, log.steps.time_s.size // MOST_POINTS)
     time_s, clearance_m = log.steps.time_s[::stride], log.steps.clearance_m[::stride]
     ticks = log.ticks
-    axes.plot(ticks.tick_s, ticks.esdf_clearance_m, color=style.ORANGE, lw=1.0, label="in the map (ESDF)")
+    if len(ticks.tick_s):  # a judged recording has none
+        axes.plot(ticks.tick_s, ticks.esdf_clearance_m, color=style.ORANGE, lw=1.0, label="in the map (ESDF)")
     axes.plot(time_s, clearance_m, color=style.BLUE, lw=1.3, label="true")
     if math.isfinite(safety_threshold_m):
         limit_m = safety_threshold_m
-        axes.axhline(limit_m, color=style.BLACK, lw=0.8, ls=(0, (4, 2)), label=f"{limit_m:g} m")
+        axes.axhline(
+            limit_m, color=style.BLACK, lw=0.8, ls=(0, (4, 2)), label=f"safe clearance, {limit_m:g} m"
+        )
         below: dict[str, Any] = {"where": clearance_m < limit_m, "color": style.VERMILLION, "alpha": 0.45}
         axes.fill_between(time_s, clearance_m, limit_m, lw=0, **below)
     for contact in log.contacts:
@@ -137,13 +140,18 @@ def _finish_panel(axes: Axes, log: TrialLog, *, legend: bool = True) -> None:
 
 def _handles(world: World, log: TrialLog) -> list[Line2D | Patch]:
     low_m, high_m = plan_view.band_m(world)
+    shortest = Line2D([], [], color=style.BLACK, lw=0.9, ls="--", label="true shortest path (3D)")
+    plans = Line2D([], [], color=style.SKY, lw=1.0, label="plans")
+    mapped = Line2D([], [], color=style.MAPPED, marker="s", ls="", ms=3, mew=0, label="mapped there")
     return [
         Line2D([], [], color=plan_view.SPEED_COLOURS(0.7), lw=2.2, label="flown"),
-        Line2D([], [], color=style.BLACK, lw=0.9, ls="--", label="true shortest path (3D)"),
-        Line2D([], [], color=style.SKY, lw=1.0, label="plans"),
+        *(
+            [shortest] if len(world.shortest_path) > 1 else []
+        ),  # a judged recording has none, no plans, no map
+        *([plans] if any(len(replan.trajectory_m) for replan in log.replans) else []),
         Patch(color=style.SURFACE, label=f"true, z {low_m:.1f} to {high_m:.1f} m"),
         Patch(color=style.SOLID, label="solid or shut off there"),
-        Line2D([], [], color=style.MAPPED, marker="s", ls="", ms=3, mew=0, label="mapped there"),
+        *([mapped] if len(log.mapped_m) else []),
         Line2D([], [], color="white", marker="o", ls="", mec=style.BLACK, mew=1.3, ms=7, label="start"),
         Line2D(
             [], [], color=style.YELLOW, marker="*", ls="", mec=style.BLACK, mew=0.8, ms=12, label="target"

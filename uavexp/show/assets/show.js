@@ -199,7 +199,7 @@
     pen.fillStyle = ink;
     pen.font = "11px system-ui, sans-serif";
     const row = rowAt(flight.time_s, now);
-    pen.fillText(`clearance to the nearest obstacle: ${flight.clearance_m[row].toFixed(2)} m`, 6, 12);
+    pen.fillText(`clearance to the nearest obstacle: ${flight.clearance_m[row].toFixed(2)} m (drawn from 0 to ${top.toFixed(1)} m)`, 6, 12);
   }
 
   function drawWords(view) {
