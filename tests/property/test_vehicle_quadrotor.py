@@ -39,21 +39,18 @@ def test_mixer_keeps_rotor_limits_and_never_gives_up_tilt_for_yaw(thrust, roll, 
     assert (speeds >= low * (1 - 1e-9)).all()
     assert (speeds <= high * (1 + 1e-9)).all()
     got_thrust, got = wrench(speeds)
-    span = PLANT.thrust_coefficient * (high**2 - low**2)
-    need = (abs(roll) + abs(pitch)) / (2.0 * PLANT.lever_m)  # largest minus smallest rotor force
-    share = min(1.0, span / need) if need > 0.0 else 1.0
+    least, most = PLANT.thrust_coefficient * low**2, PLANT.thrust_coefficient * high**2
+    need = (abs(roll) + abs(pitch)) / (4.0 * PLANT.lever_m)  # what a rotor gets and another one gives
+    room = min(max(0.25 * thrust - least, 0.0), 0.5 * (most - least))
+    share = min(1.0, room / need) if need > 0.0 else 1.0
     np.testing.assert_allclose(got[:2], [share * roll, share * pitch], atol=1e-8)
+    assert got_thrust <= max(thrust, 4 * least) + 1e-8
     # yaw never overdone nor reversed
     assert got[2] * yaw >= -1e-9
     assert abs(got[2]) <= abs(yaw) + 1e-9
     if got[2] and abs(got[2]) < abs(yaw) - 1e-6:  # given up only where a rotor is at a limit
         assert np.isclose(speeds, low).any() or np.isclose(speeds, high).any()
-    rotor = 0.25 * need
-    if (
-        4 * (PLANT.thrust_coefficient * low**2 + 2 * rotor)
-        < thrust
-        < 4 * (PLANT.thrust_coefficient * high**2 - 2 * rotor)
-    ):
+    if 4 * least < thrust < 4 * (most - share * need):
         assert abs(got_thrust - thrust) < 1e-8
 
 

@@ -1,13 +1,16 @@
 """Cascaded position-velocity loop with acceleration feed-forward, to thrust and attitude.
 
     v* = v_ref + clip(k_p (p_ref - p))
-    a* = clip(a_ref + k_v (v* - v)), of it along v at most k_s (v_max - |v|)
+    a* = clip(a_ref + k_v (v* - v - |e| e / 2j)), of it along v at most k_s (v_most - |v|)
     f  = a* + (c / m) |v| v + g e3, tilted at most `max_tilt_rad`        thrust = m f . z_body
 
 Body z of the wanted attitude points along f, its heading is the reference's yaw; the yaw
-rate of the reference is fed forward. The bound along v is a barrier (Ames et al. 2017): however far
-behind the vehicle is, its speed comes no faster to its limit than exponentially, and returns from
-beyond it. Clipping v* would not do, since a_ref drives on. Paper 1 names a position-velocity loop
+rate of the reference is fed forward. e is what the attitude gives sideways beyond a_ref, and
+|e| e / 2j the velocity that still comes of it while the thrust turns back at the body-rate limit,
+at jerk j: without it, a vehicle far off its reference turns back too late, again and again. The bound
+along v is a barrier (Ames et al. 2017): however far behind the vehicle is, its speed comes no faster to
+its limit than exponentially, and returns from beyond it. Clipping v* would not do, since a_ref drives on.
+Paper 1 names a position-velocity loop
 and no more; gains and bounds are [ours].
 """
 
@@ -21,9 +24,10 @@ import numba as nb
 import numpy as np
 
 from uavexp.arrays import Float
+from uavexp.braking import jerk_mps3
 from uavexp.errors import require
 from uavexp.geometry import GRAVITY_MPS2, quaternion_from_rotation
-from uavexp.parameters import NonNegative, Positive, above, at_most, option
+from uavexp.parameters import NonNegative, Positive, PositiveShare, above, at_most, option
 from uavexp.types import Command, Limits, Reference, State
 from uavexp.vehicle.base import Vehicle
 from uavexp.vehicle.body import require_flyable_drag
@@ -41,6 +45,7 @@ class Gains(NamedTuple):
     drag_per_m: float
     max_speed_mps: float
     speed_gain_per_s: float
+    max_jerk_mps3: float
     max_acceleration_mps2: float
 
 
@@ -76,6 +81,30 @@ def _clip_along(acceleration: Float, velocity: Float, speed: float, limit: float
 
 
 @nb.njit(cache=True)
+def _body_z(q: Float) -> Float:
+    """Body z (3,) of an attitude (4,) in the world."""
+    return np.array(
+        [
+            2.0 * (q[1] * q[3] + q[0] * q[2]),
+            2.0 * (q[2] * q[3] - q[0] * q[1]),
+            1.0 - 2.0 * (q[1] * q[1] + q[2] * q[2]),
+        ]
+    )
+
+
+@nb.njit(cache=True)
+def _still_to_come(body_z: Float, drag: Float, reference_acceleration: Float, gains: Gains) -> Float:
+    """Velocity (3,), m/s, that the present tilt still gives beyond the reference while it is turned back."""
+    excess = np.zeros(3)
+    lift = max(GRAVITY_MPS2 + reference_acceleration[2], _LEAST_LIFT * GRAVITY_MPS2)
+    for i in range(2):
+        excess[i] = lift * body_z[i] / max(body_z[2], _LEAST_LIFT) - drag[i] - reference_acceleration[i]
+    _clip_norm(excess, gains.max_acceleration_mps2)
+    excess *= 0.5 / gains.max_jerk_mps3 * math.sqrt(excess[0] * excess[0] + excess[1] * excess[1])
+    return excess
+
+
+@nb.njit(cache=True)
 def thrust_and_attitude(
     position_m: Float,
     velocity_mps: Float,
@@ -87,24 +116,25 @@ def thrust_and_attitude(
     gains: Gains,
 ) -> tuple[float, Float]:
     """Specific thrust along body z, m/s², and wanted attitude (4,); see the module's equations."""
+    body_z = _body_z(q)
+    speed = math.sqrt(velocity_mps[0] ** 2 + velocity_mps[1] ** 2 + velocity_mps[2] ** 2)
+    drag = gains.drag_per_m * speed * velocity_mps
     correction = gains.position_per_s * (reference_position_m - position_m)
     _clip_norm(correction, gains.max_correction_mps)
     wanted_mps = reference_velocity_mps + correction
+    wanted_mps -= _still_to_come(body_z, drag, reference_acceleration_mps2, gains)
     force = reference_acceleration_mps2 + gains.velocity_per_s * (wanted_mps - velocity_mps)
     _clip_norm(force, gains.max_acceleration_mps2)
-    speed = math.sqrt(velocity_mps[0] ** 2 + velocity_mps[1] ** 2 + velocity_mps[2] ** 2)
     if speed > 0.0:
         _clip_along(force, velocity_mps, speed, gains.speed_gain_per_s * (gains.max_speed_mps - speed))
-    force += gains.drag_per_m * speed * velocity_mps
+    force += drag
     force[2] = max(force[2] + GRAVITY_MPS2, _LEAST_LIFT * GRAVITY_MPS2)
     sideways = math.sqrt(force[0] * force[0] + force[1] * force[1])
     most = force[2] * math.tan(gains.max_tilt_rad)
     if sideways > most:
         force[0] *= most / sideways
         force[1] *= most / sideways
-    body_z_x, body_z_y = 2.0 * (q[1] * q[3] + q[0] * q[2]), 2.0 * (q[2] * q[3] - q[0] * q[1])
-    body_z_z = 1.0 - 2.0 * (q[1] * q[1] + q[2] * q[2])
-    thrust = force[0] * body_z_x + force[1] * body_z_y + force[2] * body_z_z
+    thrust = force[0] * body_z[0] + force[1] * body_z[1] + force[2] * body_z[2]
     return max(thrust, 0.0), _attitude(force, yaw_rad)
 
 
@@ -116,8 +146,10 @@ class PositionVelocity:
     position_gain_per_s: Positive = 2.0  # 1/s, from position error to a correction of velocity [ours]
     velocity_gain_per_s: Positive = 5.0  # 1/s, from velocity error to acceleration [ours]
     max_correction_mps: Positive = 1.0  # m/s, largest correction of velocity for a position error [ours]
-    speed_gain_per_s: Positive = 3.0  # 1/s, from what is left to the vehicle's speed limit to the largest
+    speed_gain_per_s: Positive = 3.0  # 1/s, from what is left to the speed bound to the largest
     # acceleration along the motion; the attitude lags by 0.2 s [ours]
+    speed_share: PositiveShare = 0.99  # of the vehicle's speed limit: the speed bound; that lag carries the
+    # vehicle 0.1 % beyond it [ours]
     acceleration_share: Positive = 2.0  # of the vehicle's acceleration limit: largest acceleration asked for;
     # plans use up to one [ours]
     max_tilt_rad: Annotated[float, above(0), at_most(1.2)] = 0.6  # rad, largest tilt asked for;
@@ -152,8 +184,9 @@ class PositionVelocity:
             max_correction_mps=self.max_correction_mps,
             max_tilt_rad=self.max_tilt_rad,
             drag_per_m=self.drag_kgpm / self._mass_kg,
-            max_speed_mps=self._limits.max_speed_mps,
+            max_speed_mps=self.speed_share * self._limits.max_speed_mps,
             speed_gain_per_s=self.speed_gain_per_s,
+            max_jerk_mps3=jerk_mps3(self._limits),
             max_acceleration_mps2=self.acceleration_share * self._limits.max_acceleration_mps2,
         )
 

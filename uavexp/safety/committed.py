@@ -73,7 +73,7 @@ from uavexp.safety.speed_profile import (
     room_before_person_m,
     speed_before_person_mps,
 )
-from uavexp.trajectory import Trajectory, evaluate
+from uavexp.trajectory import Trajectory, derivative, evaluate
 from uavexp.types import Limits, Observation, Squeeze
 
 _SAMPLE_S = 0.02  # at 2.5 m/s half a voxel apart
@@ -98,6 +98,8 @@ class Committed:
     reaction_s: NonNegative = 0.4  # s, slowing begins so much earlier: the thrust has to be turned
     # around [ours]
     turn_share: PositiveShare = 0.3  # of the body rate limit, with which the thrust is turned for it [ours]
+    plan_turn_share: PositiveShare = 0.5  # of the body rate limit; a plan that turns the thrust faster is
+    # flown slower there [ours]
     narrow_clearance_m: NarrowClearance = 0.22  # m, clearance of narrow places, which are flown slowly [ours]
     narrow_speed_mps: NarrowSpeed = 1.0  # m/s, in narrow places [ours]
     creep_mps: NonNegative = 0.3  # m/s, out of a place whose surroundings were not seen [ours]
@@ -118,6 +120,7 @@ class _Ahead:
 
     own_s: Float  # (N,) of the plan
     way: Way
+    jerk_mps3: Float  # (N,)
     point_m: Float  # (N, 3)
     along_m: Float  # (N,) length of the way
     ends: bool  # whether the plan ends within
@@ -156,6 +159,8 @@ class _Commitment:
             rest = max(min(rest, end), int(np.searchsorted(ahead.along_m, _HERE_M, side="right")) - 1)
         top = 0.0 if stops else self._top_rate(ahead, clearance_m, observation)
         bound = np.minimum(bound_mps / np.maximum(ahead.way.speed_mps, _SLOW_MPS), top)
+        turning_mps3 = self.rules.plan_turn_share * jerk_mps3(self.limits)
+        bound = np.minimum(bound, np.cbrt(turning_mps3 / np.maximum(ahead.jerk_mps3, turning_mps3)))
         rates, early_s, kept = fastest_rates(ahead.way, rate, bound, rest, self._effort)
         refused = "" if kept else f"no stop from {rate[0] * ahead.way.speed_mps[0]:.2f} m/s in what was seen"
         return Flyable(pace_over(start_s, ahead.own_s, rates, early_s), refused)
@@ -193,7 +198,8 @@ class _Commitment:
         across = np.sqrt(np.maximum((acceleration**2).sum(axis=1) - along**2, 0.0))
         way = Way(np.diff(own_s[:far]), speed, along, across)
         ends = far >= len(own_s) and own_s[-1] == plan.end_s
-        return _Ahead(own_s[:far], way, point_m[:far], along_m[:far], ends)
+        jerk = np.linalg.norm(derivative(plan, own_s[:far], 3), axis=1)
+        return _Ahead(own_s[:far], way, jerk, point_m[:far], along_m[:far], ends)
 
     def _verified(
         self, ahead: _Ahead, observation: Observation, squeeze: Squeeze | None

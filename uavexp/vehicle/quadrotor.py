@@ -159,17 +159,19 @@ def wanted_body_rate(q: Float, wanted: Float, feed_forward: Float, loop: Attitud
 def mix(thrust_N: float, moment_Nm: Float, plant: Plant, rotor_command_radps: Float) -> None:
     """Write the rotor speeds (4,), rad/s, that give this thrust and moment (3,) as far as they can.
 
-    When a rotor saturates, yaw moment is given up first, then thrust, then roll and pitch.
+    When a rotor saturates, yaw moment is given up first, then roll and pitch at a rotor's least speed, thrust
+    at its most: thrust is never raised for a moment, with which the vehicle would climb off its way.
     """
     low = plant.thrust_coefficient * plant.min_rotor_speed_radps**2
     high = plant.thrust_coefficient * plant.max_rotor_speed_radps**2
+    share = max(0.25 * thrust_N, low)
     tilt = np.empty(4)
     for i in range(4):
         tilt[i] = (_SIDE_Y[i] * moment_Nm[0] - _SIDE_X[i] * moment_Nm[1]) / (4.0 * plant.lever_m)
-    span = tilt.max() - tilt.min()
-    if span > high - low:
-        tilt *= (high - low) / span
-    share = min(max(0.25 * thrust_N, low - tilt.min()), high - tilt.max())
+    room = min(share - low, 0.5 * (high - low))
+    if tilt.max() > room:  # as much is taken from one rotor as another one gets
+        tilt *= room / tilt.max()
+    share = min(share, high - tilt.max())
     yaw = -0.25 * moment_Nm[2] * plant.thrust_coefficient / plant.torque_coefficient
     for i in range(4):  # largest common share of the yaw moment that no rotor refuses
         force, extra = share + tilt[i], _SPIN[i] * yaw

@@ -147,7 +147,8 @@ def test_drag_compensation_takes_the_drag_error_away():
             Quadrotor(drag_coefficient=40.0), cruise, 8.0, controller=PositionVelocity(drag_kgpm=compensated)
         )
         error[compensated] = float(np.linalg.norm(states[-1].position_m - wanted[-1]))
-    assert error[0.0] == pytest.approx(drag_kgpm * 2.2**2 / 0.75 / (2.0 * 5.0), rel=0.05)  # a / (k_p k_v)
+    drag_mps2 = drag_kgpm * 2.2**2 / 0.75  # a: the error is (a / k_v + a^2 / 2j) / k_p
+    assert error[0.0] == pytest.approx((drag_mps2 / 5.0 + drag_mps2**2 / (4.0 * 9.81)) / 2.0, rel=0.05)
     assert error[drag_kgpm] < 0.05 * error[0.0]
 
 
@@ -182,8 +183,48 @@ def test_thrust_is_the_wanted_force_along_the_body_as_it_stands():
         quaternion_wxyz=np.array([np.cos(0.2), np.sin(0.2), 0.0, 0.0]),
         body_rate_radps=np.zeros(3),
     )
+    given = Reference(
+        position_m=START,
+        velocity_mps=np.zeros(3),
+        acceleration_mps2=np.array([0.0, -9.81 * np.tan(0.4), 0.0]),
+        yaw_rad=0.0,
+    )
+    assert controller.command(tilted, given).thrust_N == pytest.approx(0.75 * 9.81 / np.cos(0.4))
+
+
+def test_a_tilt_that_takes_time_to_turn_back_is_countered_early():
+    """From 5 m/s² to none at 19.62 m/s³ is 0.64 m/s more, against which 5/s of it is asked for."""
+    controller, vehicle = PositionVelocity(), Quadrotor()
+    controller.reset(vehicle.limits, vehicle.mass_kg)
+    half = 0.5 * np.arctan(5.0 / 9.81)
+    tilted = State(
+        position_m=START,
+        velocity_mps=np.zeros(3),
+        quaternion_wxyz=np.array([np.cos(half), 0.0, np.sin(half), 0.0]),
+        body_rate_radps=np.zeros(3),
+    )
     rest = Reference(position_m=START, velocity_mps=np.zeros(3), acceleration_mps2=np.zeros(3), yaw_rad=0.0)
-    assert controller.command(tilted, rest).thrust_N == pytest.approx(0.75 * 9.81 * np.cos(0.4))
+    up = rotation_from_quaternion(controller.command(tilted, rest).quaternion_wxyz)[:, 2]
+    assert 9.81 * up[0] / up[2] == pytest.approx(-5.0 * 5.0**2 / (2.0 * 19.62))
+
+
+def test_a_vehicle_thrown_off_its_place_does_not_swing():
+    """Knocked to 1.5 m/s, sideways along a diagonal: it comes back past its place by at most 2 cm."""
+    vehicle, controller = Quadrotor(), PositionVelocity()
+    knocked = State(
+        position_m=START,
+        velocity_mps=np.array([1.2, 0.9, 0.0]),
+        quaternion_wxyz=np.array([1.0, 0.0, 0.0, 0.0]),
+        body_rate_radps=np.zeros(3),
+    )
+    vehicle.reset(knocked)
+    controller.reset(vehicle.limits, vehicle.mass_kg)
+    rest = Reference(position_m=START, velocity_mps=np.zeros(3), acceleration_mps2=np.zeros(3), yaw_rad=0.0)
+    state, along = knocked, []
+    for _ in range(400):
+        state = vehicle.step(controller.command(state, rest), STEP_S)
+        along.append((state.position_m - START) @ [0.8, 0.6, 0.0])
+    assert min(along) > -0.02
 
 
 def worst_error_m(turn_share, seed):
@@ -214,15 +255,15 @@ def worst_error_m(turn_share, seed):
 
 
 def test_a_thrust_that_turns_at_half_the_body_rate_is_followed():
-    """`planner.turn_share`: at the whole rate the quadrotor overshoots again and again."""
-    assert max(worst_error_m(0.5, seed) for seed in range(4)) < 0.2
-    assert max(worst_error_m(0.4, seed) for seed in range(4)) < 0.12
-    assert max(worst_error_m(1.0, seed) for seed in range(4)) > 0.3
+    """`planner.turn_share`; at the whole rate the quadrotor lags, but does not swing ever farther."""
+    assert max(worst_error_m(0.5, seed) for seed in range(4)) < 0.12
+    assert max(worst_error_m(0.4, seed) for seed in range(4)) < 0.1
+    assert max(worst_error_m(1.0, seed) for seed in range(8)) < 0.5
 
 
-@pytest.mark.parametrize(("speed_mps", "most_mps2"), [(2.4, 0.3), (2.5, 0.0), (2.0, 1.5)])
+@pytest.mark.parametrize(("speed_mps", "most_mps2"), [(2.4, 0.225), (2.475, 0.0), (2.0, 1.425)])
 def test_what_pushes_on_fades_towards_the_speed_limit(speed_mps: float, most_mps2: float) -> None:
-    """At most 3/s of what is left to 2.5 m/s, along the motion; the reference runs away in front."""
+    """At most 3/s of what is left to 99 % of 2.5 m/s, along the motion; the reference runs away in front."""
     limits = Limits(
         max_speed_mps=2.5, max_acceleration_mps2=2.5, max_body_rate_radps=4.0, body_size_m=(0.3, 0.3, 0.1)
     )

@@ -133,6 +133,15 @@ def test_mixer_gives_up_yaw_first_then_thrust():
     assert thrust < 4 * PLANT.thrust_coefficient * PLANT.max_rotor_speed_radps**2
 
 
+def test_mixer_never_raises_the_thrust_for_a_moment():
+    """At hover a rotor gives at most what it carries: so much moment, and no climb."""
+    hover = PLANT.mass_kg * GRAVITY_MPS2
+    thrust, moment = wrench(mixed(hover, [1.0, 0.0, 0.0]))
+    assert thrust == pytest.approx(hover)
+    least = PLANT.thrust_coefficient * PLANT.min_rotor_speed_radps**2
+    np.testing.assert_allclose(moment, [4 * PLANT.lever_m * (hover / 4 - least), 0.0, 0.0], atol=1e-12)
+
+
 def test_yaw_moment_is_the_reaction_of_the_rotors():
     """Rotors 1 and 3 turn about +z: more of them turns the body about -z."""
     _, moment = wrench((300.0, 200.0, 300.0, 200.0))
