@@ -13,9 +13,13 @@ from typing import Any
 
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
 
+from uavexp import causes
 from uavexp.cli.helptext import described, groups_of
 from uavexp.config.options import Option
+from uavexp.metrics.evaluate import METRICS
+from uavexp.metrics.metric import Metric
 
 ROOT = Path(__file__).parents[1]
 PAPERS = {
@@ -102,6 +106,29 @@ def _parameters(group: str, option: Option) -> list[str]:
         for item in option.parameters
     ]
     return ["| parameter | default | meaning |", "|---|---|---|", *rows, ""]
+
+
+def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
+    """Fill in what stands in a table of trials: every cause, every metric with its unit."""
+    if page.file.src_uri != "columns.md":
+        return markdown
+    metrics = {re.sub(r"_at_\d+$", "_at_N", metric.column): metric for metric in METRICS}
+    for mark, rows in {
+        "<!-- causes of triggers -->": [f"| `{cause.name}` | {cause.label} |" for cause in causes.POLICY],
+        "<!-- causes of the pilot -->": [f"| `{cause.name}` | {cause.label} |" for cause in causes.PILOT],
+        "<!-- metrics -->": [_metric_row(column, metric) for column, metric in metrics.items()],
+    }.items():
+        markdown = markdown.replace(mark, "\n".join(rows))
+    return markdown
+
+
+def _metric_row(column: str, metric: Metric) -> str:
+    title = re.sub(r"\d+ iterations", "N iterations", metric.title or metric.column).replace(
+        "|", chr(92) + "|"
+    )
+    unit = "share, 0 to 1" if metric.scale == 100.0 else metric.unit
+    better = {1: "more", -1: "less", 0: ""}[metric.better]
+    return f"| `{column}` | {title} | {unit} | {better} | {metric.missing} |"
 
 
 def _study_page(folder: Path) -> str:

@@ -22,7 +22,7 @@ FILES = {  # the last file named before a block of code is that block
 COMMANDS = [line for block in re.findall(r"```sh\n(.*?)```", GUIDE, re.S) for line in block.splitlines()]
 # the same flights, smaller: what a command flies is added to it
 SMALLER = {
-    "planner=straight": " world=random_columns mission.time_base_s=2 mission.time_per_path_spm=0",
+    "planner=straight": " mission.time_base_s=2 mission.time_per_path_spm=0",
     "experiments=": " vehicle=point_mass mission.time_base_s=4 mission.time_per_path_spm=0 out=study",
 }
 
