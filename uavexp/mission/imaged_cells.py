@@ -69,7 +69,7 @@ def imaged_cells(
     for n in range(point.shape[0]):
         if not sought[n]:
             continue
-        x, y, z = point[n, 0] - frame.position_m[0], point[n, 1] - frame.position_m[1], 0.0
+        x, y = point[n, 0] - frame.position_m[0], point[n, 1] - frame.position_m[1]
         z = point[n, 2] - frame.position_m[2]
         square = x * x + y * y + z * z
         if square > optics.max_range_m**2 or square < optics.min_range_m**2:

@@ -86,6 +86,20 @@ def test_an_image_shows_what_a_tilted_pinhole_frames(scene: Scene, tilt_deg: flo
     assert found[sure].all()
 
 
+@pytest.mark.parametrize(("incidence_deg", "range_m"), [(35.0, 5.0), (70.0, 3.5)])
+def test_an_image_keeps_the_limits_of_incidence_and_range(
+    scene: Scene, incidence_deg: float, range_m: float
+) -> None:
+    camera, cells = Camera(max_incidence_rad=math.radians(incidence_deg), max_range_m=range_m), wall_cells()
+    line = cells.point_m - EYE_M
+    length = np.linalg.norm(line, axis=1)
+    allowed = (line[:, 0] >= length * math.cos(math.radians(incidence_deg))) & (length <= range_m)
+    found = seen(image_eye(scene, camera), cells, frames=30)
+    assert not found[~allowed].any()
+    assert found[allowed & (length < range_m - 0.2)].all()
+    assert (allowed & (length < range_m - 0.2)).sum() > 30
+
+
 def test_level_and_in_many_frames_image_and_rays_agree(scene: Scene) -> None:
     cells = wall_cells()
     rays = seen(RayEye(scene=scene, camera=CAMERA, tolerance_m=TOLERANCE_M), cells)
