@@ -19,7 +19,6 @@ from uavexp.geometry import polyline_length_m
 from uavexp.log import TrialLog
 from uavexp.metrics import voxel_path
 from uavexp.metrics.metric import Flight, Measure, Metric, Metrics
-from uavexp.scene import Scene
 from uavexp.trajectory import Trajectory, evaluate
 
 GRID_S = 1e-3
@@ -60,6 +59,8 @@ def sampled(flight: Flight) -> Sampled | None:
     trajectory = planned(flight.log)
     if trajectory is None:
         return None
+    from uavexp.scene import Scene  # Open3D takes seconds to load, and whoever reads a log needs none
+
     count = int(np.ceil(trajectory.duration_s / GRID_S)) + 1
     times_s = np.linspace(trajectory.start_s, trajectory.end_s, count)
     position_m, velocity_mps, acceleration_mps2 = evaluate(trajectory, times_s)
