@@ -48,14 +48,14 @@ class Places(NamedTuple):
 
 
 @nb.njit(cache=True, inline="always")
-def _state_at(places: Places, x: float, y: float, z: float) -> int:
+def _state_at(state: UInt8, origin_m: Float, voxel_m: float, x: float, y: float, z: float) -> int:
     """State of the voxel that holds a point; UNKNOWN outside."""
-    i = int(np.floor((x - places.origin_m[0]) / places.voxel_m))
-    j = int(np.floor((y - places.origin_m[1]) / places.voxel_m))
-    k = int(np.floor((z - places.origin_m[2]) / places.voxel_m))
-    nx, ny, nz = places.state.shape
+    i = int(np.floor((x - origin_m[0]) / voxel_m))
+    j = int(np.floor((y - origin_m[1]) / voxel_m))
+    k = int(np.floor((z - origin_m[2]) / voxel_m))
+    nx, ny, nz = state.shape
     inside = 0 <= i < nx and 0 <= j < ny and 0 <= k < nz
-    return int(places.state[i, j, k]) if inside else UNKNOWN
+    return int(state[i, j, k]) if inside else UNKNOWN
 
 
 @nb.njit(cache=True)
@@ -63,14 +63,15 @@ def is_place(places: Places, x: float, y: float, z: float) -> bool:
     """Whether the body may wait at a point: clear, within the bounds, and seen all around."""
     low, high, r = places.low_m, places.high_m, places.radius_m
     inside = low[0] <= x <= high[0] and low[1] <= y <= high[1] and low[2] <= z <= high[2]
-    if not inside or _state_at(places, x, y, z) != FREE:
+    state, origin_m, voxel_m = places.state, places.origin_m, places.voxel_m
+    if not inside or _state_at(state, origin_m, voxel_m, x, y, z) != FREE:
         return False
-    if value_at(places.distance, places.origin_m, places.voxel_m, x, y, z) < places.clearance_m:
+    if value_at(places.distance, origin_m, voxel_m, x, y, z) < places.clearance_m:
         return False
     for dx in (-r, 0.0, r):
         for dy in (-r, 0.0, r):
-            for dz in (-places.voxel_m, places.voxel_m):
-                if _state_at(places, x + dx, y + dy, z + dz) == UNKNOWN:
+            for dz in (-voxel_m, voxel_m):
+                if _state_at(state, origin_m, voxel_m, x + dx, y + dy, z + dz) == UNKNOWN:
                     return False
     return True
 
@@ -80,12 +81,15 @@ def _sees(places: Places, eye: Float, point: Float) -> bool:
     """Whether nothing occupied lies between an eye (3,) and a point (3,), nor unseen but near the point."""
     x, y, z = point[0] - eye[0], point[1] - eye[1], point[2] - eye[2]
     length = math.sqrt(x * x + y * y + z * z)
-    stride = _STRIDE_VOXELS * places.voxel_m
+    state, origin_m, voxel_m = places.state, places.origin_m, places.voxel_m
+    stride, near_m = _STRIDE_VOXELS * voxel_m, _NEAR_CELLS * places.cell_m
     for n in range(1, int(length / stride) + 1):
         share = n * stride / length
-        state = _state_at(places, eye[0] + x * share, eye[1] + y * share, eye[2] + z * share)
-        near = length - n * stride < _NEAR_CELLS * places.cell_m
-        if state == OCCUPIED or (state == UNKNOWN and not near):
+        there = _state_at(
+            state, origin_m, voxel_m, eye[0] + x * share, eye[1] + y * share, eye[2] + z * share
+        )
+        near = length - n * stride < near_m
+        if there == OCCUPIED or (there == UNKNOWN and not near):
             return False
     return True
 
