@@ -36,8 +36,10 @@ _SMALL = (
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
-    """Before several processes share the tests: the golden flights, which compile the kernels for all."""
-    if session.config.getoption("numprocesses", None) and not hasattr(session.config, "workerinput"):
+    """Before several processes share all tests: the golden flights, which compile the kernels for all."""
+    whole = session.config.args_source is pytest.Config.ArgsSource.TESTPATHS
+    shared = session.config.getoption("numprocesses", None) and not hasattr(session.config, "workerinput")
+    if whole and shared:
         file = Path(tempfile.mkdtemp(prefix="uavexp-golden-")) / "flown.json"
         session.config.add_cleanup(lambda: shutil.rmtree(file.parent))
         with contextlib.suppress(CalledProcessError):  # their test tells
