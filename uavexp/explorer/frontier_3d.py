@@ -53,6 +53,7 @@ from uavexp.types import Goal, Limits, Observation
 
 _ARRIVED_M, _ARRIVED_RAD, _DWELL_S = 0.35, 0.3, 0.5
 _DETOUR_M = 3.0  # by which the way there may be longer than to the cluster's nearest place
+_MOST_LEFT = 6  # by then it is a hundred metres
 _SAME_M = 1.0  # a cluster whose place is so near to the goal goes on where the goal was
 
 
@@ -96,7 +97,10 @@ class Frontier3d:
     # there are floors; no cell counts as more than 5 [ours]
     covered_share: Share = 0.3  # a goal is left when so little of what it shows is still unseen [ours]
     rethink_s: Positive = 1.0  # s, a goal is compared with others after so long [ours]
-    hysteresis_m: NonNegative = 1.5  # m, that another goal must be better [ours]
+    hysteresis_m: NonNegative = (
+        1.5  # m, that another goal must be better, and twice as much for each that was
+    )
+    # left for another since one was looked at [ours]
     turn_m: NonNegative = 1.5  # m, that turning back in flight, and half a turn of the yaw, count as [ours]
     look_m: NonNegative = 5.0  # m, so near to a place the yaw is that with which it shows most; before, the
     # way ahead is looked at [ours]
@@ -108,6 +112,7 @@ class Frontier3d:
     _choice: _Choice | None = field(init=False, repr=False, default=None)
     _aside: list[tuple[float, Float]] = field(init=False, repr=False, default_factory=list)
     _there_since_s: float = field(init=False, repr=False, default=math.inf)
+    _left: int = field(init=False, repr=False, default=0)
 
     def __post_init__(self) -> None:
         low, high = self.lowest_deg, self.highest_deg
@@ -121,7 +126,7 @@ class Frontier3d:
         """Begin a trial; heights are free, so the flight height counts for nothing."""
         del flight_height_m
         self._limits, self._space, self._choice = limits, None, None
-        self._aside, self._there_since_s = [], math.inf
+        self._aside, self._there_since_s, self._left = [], math.inf, 0
 
     def reject(self, position_m: Float, time_s: float) -> None:
         """Set a place aside, and take a look off what it shows: no plan leads there."""
@@ -140,7 +145,7 @@ class Frontier3d:
         self._aside = [entry for entry in self._aside if entry[0] > now_s]
         self._count_looks(space, observation)
         if self._choice is not None and not self._is_open(space, self._choice):
-            self._choice = None
+            self._choice, self._left = None, 0
         choice = self._choice
         age_s = math.inf if choice is None else now_s - choice.made_s
         if choice is not None and (age_s == 0.0 or not self._is_due(choice, age_s, here_m, fresh=fresh)):
@@ -215,7 +220,7 @@ class Frontier3d:
         self._there_since_s = math.inf
         if looks:
             space.cells.looked[choice.cells] += 1
-            self._choice = None
+            self._choice, self._left = None, 0
         else:
             self.reject(choice.leg_m, now_s)
 
@@ -274,7 +279,8 @@ class Frontier3d:
     def _best(self, space: Space, observation: Observation, clusters: Sequence[Cluster]) -> _Choice | None:
         """The place to go to first."""
         kept = self._choice
-        spare_m = self.hysteresis_m + 2.0 * self.turn_m
+        stay_m = self.hysteresis_m * 2.0 ** min(self._left, _MOST_LEFT)
+        spare_m = stay_m + 2.0 * self.turn_m
         found = space.candidates(clusters, self._aside_of, spare_m)
         if not found.clusters:
             return None
@@ -282,7 +288,7 @@ class Frontier3d:
         going_on = np.zeros(len(cost_m), dtype=np.bool_)
         if kept is not None and not kept.is_target:
             going_on = np.linalg.norm(found.eyes_m - kept.place_m, axis=1) < _SAME_M
-        cost_m = cost_m - self.hysteresis_m * going_on
+            cost_m = cost_m + stay_m * (going_on.any() & ~going_on)
         if space.ways.target is None:
             first = int(space.ways.tour(found.cells, np.maximum(cost_m, 0.0), found.there_m)[0])
         else:
@@ -297,6 +303,7 @@ class Frontier3d:
         ):
             place_m, shown = kept.place_m, (kept.cells, kept.yaw_rad)
         else:
+            self._left += kept is not None
             place_m, shown = found.eyes_m[first], self._shown(space, found, first)
         return self._bound_for(space, observation, place_m, -float(cost_m[first]), shown)
 

@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from uavexp.arrays import Bool, Float
+from uavexp.arrays import Bool, Float, Int
 from uavexp.check.fields import empty, field_from
 from uavexp.check.hall import LIMITS, hovering, observe
 from uavexp.explorer.frontier_3d import Frontier3d
+from uavexp.explorer.volume.route import Ways
 from uavexp.field import UNKNOWN, DistanceField
 from uavexp.types import Goal, Observation
 
@@ -185,3 +186,25 @@ def test_a_start_of_which_not_all_around_was_seen_is_left() -> None:
     state[(away_m > 0.3) & (away_m < 0.38)] = UNKNOWN
     goal = begun().select(at(replace(whole, state=state), START_M))
     assert goal is not None
+
+
+def test_between_two_places_it_goes_to_and_fro_ever_less(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A tour that thinks of the other end of a gallery as 8 m nearer each time is not followed for ever."""
+    size_m = (20.0, 4.0, 2.4)
+    grid, unknown = empty(size_m), empty(size_m)
+    grid[[0, -1]], grid[:, [0, -1]], grid[:, :, [0, -1]] = True, True, True
+    unknown[:20], unknown[-20:] = True, True
+    field, explorer, asked = field_from(grid & ~unknown, unknown=unknown, max_distance_m=2.0), begun(), []
+    bounds_m = np.array([[0.4, 0.4, 0.4], [19.6, 3.6, 2.0]])
+
+    def fickle(ways: Ways, places: Int, first_m: Float, there_m: Float) -> Int:
+        asked.append(len(places))
+        east = ways.cells.centre_m(places)[:, 0] > 10.0
+        return np.argsort(first_m + 8.0 * (east == len(asked) % 2))
+
+    monkeypatch.setattr(Ways, "tour", fickle)
+    goals = []
+    for tick in range(12):
+        seen = replace(at(field, (10.0, 2.0, 1.2), float(tick)), flight_bounds_m=bounds_m)
+        goals.append(chosen(explorer, seen).position_m[0] > 10.0)
+    assert (np.flatnonzero(np.diff(goals)) + 1).tolist() == [1, 2, 3]  # 1.5, 3 and 6 m do not keep it, 12 do

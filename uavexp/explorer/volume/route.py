@@ -136,7 +136,7 @@ class Ways:
             first_m: (P,) what it costs to begin with each.
             there_m: (P,) length of the way from the vehicle to each, finite.
         """
-        kept = np.argsort(there_m, kind="stable")[:PLACES]
+        kept = np.argsort(first_m, kind="stable")[:PLACES]
         between = self._matrix(places[kept], there_m[kept])
         cost = np.zeros((len(kept) + 1, len(kept) + 1))
         cost[0, 1:] = cost[1:, 0] = first_m[kept]
