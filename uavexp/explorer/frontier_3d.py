@@ -100,7 +100,7 @@ class Frontier3d:
     hysteresis_m: NonNegative = (
         1.5  # m, that another goal must be better, and twice as much for each that was
     )
-    # left for another since one was looked at [ours]
+    # was left for another since one was looked at [ours]
     turn_m: NonNegative = 1.5  # m, that turning back in flight, and half a turn of the yaw, count as [ours]
     look_m: NonNegative = 5.0  # m, so near to a place the yaw is that with which it shows most; before, the
     # way ahead is looked at [ours]
