@@ -30,6 +30,7 @@ from uavexp.movers.base import Movers
 from uavexp.parameters import NonNegative, Positive, Whole, between, option
 from uavexp.passage import check_passage
 from uavexp.pilot.base import Crew, Pilot
+from uavexp.pilot.recovering import is_shut_in
 from uavexp.planner.base import Planner
 from uavexp.recorder import Recorder, Stopwatch
 from uavexp.safety.base import Safety
@@ -239,6 +240,8 @@ class _Flight:
                 found = 0, self._given_up(pilot.given_up)
             if found is None:
                 return None
+            if found[1] is Outcome.EXPLORED and is_shut_in(pilot.replans):
+                found = found[0], Outcome.STUCK  # goals were given up because none could be planned to
             unplanned = (
                 found[1] in (Outcome.STUCK, Outcome.UNREACHABLE, Outcome.EXPLORED) and not pilot.ever_planned
             )
@@ -281,6 +284,8 @@ class _Flight:
         if outcome is Outcome.TIMEOUT:
             return f"not there after {self.parts.mission.time_limit_s:g} s"
         failure = self.craft.pilot.failure
+        if is_shut_in(self.craft.pilot.replans):
+            return f"no plan led anywhere: {failure}"
         if self.craft.pilot.given_up is not None:
             return f"gave up: {failure}"
         why = f"; {failure}" if failure else ", and nothing asked for a new plan"

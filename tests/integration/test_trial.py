@@ -15,10 +15,11 @@ import pytest
 import uavexp
 from uavexp.errors import ConfigError
 from uavexp.geometry import rotation_from_quaternion
+from uavexp.planner.find_and_shape import FindAndShape
 from uavexp.scene import Scene
 from uavexp.trial import steps_per
 from uavexp.trigger.tbr import Tbr
-from uavexp.types import Decision, Observation, Outcome, PlanStatus
+from uavexp.types import Decision, Observation, Outcome, PlanRequest, PlanResult, PlanStatus
 
 SMALL: Mapping[str, Any] = {
     "world": "random_columns",
@@ -168,6 +169,26 @@ def test_exploring_sees_nearly_everything_and_says_how_much() -> None:
     trial = fly(strategy="mcr", mission="explore", **{"world.size_m": [8.0, 6.0, 2.6]})
     assert trial.log.outcome is Outcome.EXPLORED
     assert 0.7 < trial.metrics["seen_share"] <= 1.0
+
+
+@pytest.mark.parametrize("explorer", ["frontier", "frontier_3d"])
+def test_a_vehicle_that_no_plan_leads_away_has_explored_nothing(
+    explorer: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every goal is given up in the end; it used to be told as explored."""
+    plan = FindAndShape.plan
+
+    def plan_at_first(self: FindAndShape, request: PlanRequest) -> PlanResult:
+        return (
+            plan(self, request)
+            if request.time_s < 2.0
+            else PlanResult(status=PlanStatus.NO_PATH, reason="shut")
+        )
+
+    monkeypatch.setattr(FindAndShape, "plan", plan_at_first)
+    trial = fly(strategy="mcr", mission="explore", explorer=explorer, **{"world.size_m": [20.0, 12.0, 2.6]})
+    assert trial.log.outcome is Outcome.STUCK
+    assert trial.log.reason.startswith("no plan led anywhere: no_path: shut")
 
 
 def test_a_body_that_flies_into_walls_touches_but_never_passes_through() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -28,6 +29,7 @@ _SPARE_M = 0.02  # between the body's half width and an obstacle
 _BEYOND = 2.0  # body radii from where the safety holds the vehicle to what holds it
 _SAMPLE_S = 0.1
 _SAME_PLACE_M = 0.5
+_APART = 3  # goals without a plan in a row; explorations that were over had one at most
 _NO_WAY = (PlanStatus.NO_PATH, PlanStatus.GOAL_BLOCKED, PlanStatus.NOT_CLEAR)
 
 
@@ -163,6 +165,17 @@ def ending(replans: list[Replan], *, has_goal: bool) -> Outcome:
     """How a flight ends that has tried everything."""
     no_way = not replans or replans[-1].status in _NO_WAY
     return Outcome.UNREACHABLE if no_way or not has_goal else Outcome.STUCK
+
+
+def is_shut_in(replans: Sequence[Replan]) -> bool:
+    """Whether the last requests failed for `_APART` goals or more, a metre apart: no way leads anywhere."""
+    goals = set()
+    for replan in reversed(replans):
+        if replan.status is PlanStatus.OK:
+            break
+        if np.isfinite(replan.goal_m).all():
+            goals.add(tuple(np.round(replan.goal_m).tolist()))
+    return len(goals) >= _APART
 
 
 def tried(replans: list[Replan]) -> str:
