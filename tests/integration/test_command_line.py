@@ -306,12 +306,10 @@ def test_an_installed_package_finds_its_configuration_inside_itself(tmp_path: Pa
 FAULTY = ("--config-dir", str(PACKAGE.parent / "tests" / "faulty"), *TINY, "trigger=faulty", "seed=0")
 
 
-def test_a_trial_that_raises_leaves_a_record(
-    somewhere: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("UAVEXP_TRUST", "tests")
-    assert main([*FAULTY, "trigger.deed=raise", "out=run"]) == 1
-    assert "ZeroDivisionError: no such luck" in capsys.readouterr().out
+def test_a_trial_that_raises_leaves_a_record(somewhere: Path) -> None:
+    done = run(*FAULTY, "trigger.deed=raise", "out=run", cwd=somewhere, UAVEXP_TRUST="tests")
+    assert done.returncode == 1, done.stderr
+    assert "ZeroDivisionError: no such luck" in done.stdout
     table = pd.read_parquet(somewhere / "run" / "trials.parquet")
     assert list(table["outcome"]) == ["error"]
     assert list(table["success"]) == [False]
@@ -323,12 +321,10 @@ def test_a_trial_that_raises_leaves_a_record(
     assert not any(str(PACKAGE) in line for line in record["traceback"])
 
 
-def test_bad_input_that_shows_only_in_flight_is_still_bad_input(
-    somewhere: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("UAVEXP_TRUST", "tests")
-    assert main([*FAULTY, "trigger.deed=raise_bad_input", "out=run"]) == 2
-    assert capsys.readouterr().err == "error: no such device\n"
+def test_bad_input_that_shows_only_in_flight_is_still_bad_input(somewhere: Path) -> None:
+    done = run(*FAULTY, "trigger.deed=raise_bad_input", "out=run", cwd=somewhere, UAVEXP_TRUST="tests")
+    assert done.returncode == 2
+    assert done.stderr == "error: no such device\n"
     assert not list(somewhere.iterdir())
 
 
