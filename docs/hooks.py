@@ -123,9 +123,7 @@ def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
 
 
 def _metric_row(column: str, metric: Metric) -> str:
-    title = re.sub(r"\d+ iterations", "N iterations", metric.title or metric.column).replace(
-        "|", chr(92) + "|"
-    )
+    title = re.sub(r"\d+ iterations", "N iterations", metric.title or metric.column).replace("|", r"\|")
     unit = "share, 0 to 1" if metric.scale == 100.0 else metric.unit
     better = {1: "more", -1: "less", 0: ""}[metric.better]
     return f"| `{column}` | {title} | {unit} | {better} | {metric.missing} |"

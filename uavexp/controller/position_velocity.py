@@ -10,8 +10,7 @@ rate of the reference is fed forward. e is what the attitude gives sideways beyo
 at jerk j: without it, a vehicle far off its reference turns back too late, again and again. The bound
 along v is a barrier (Ames et al. 2017): however far behind the vehicle is, its speed comes no faster to
 its limit than exponentially, and returns from beyond it. Clipping v* would not do, since a_ref drives on.
-Paper 1 names a position-velocity loop
-and no more; gains and bounds are [ours].
+Paper 1 names a position-velocity loop and no more; gains and bounds are [ours].
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ import numpy as np
 from uavexp.arrays import Float
 from uavexp.braking import jerk_mps3
 from uavexp.errors import require
-from uavexp.geometry import GRAVITY_MPS2, quaternion_from_rotation
+from uavexp.geometry import GRAVITY_MPS2, quaternion_from_rotation, rotation_from_quaternion
 from uavexp.parameters import NonNegative, Positive, PositiveShare, above, at_most, option
 from uavexp.types import Command, Limits, Reference, State
 from uavexp.vehicle.base import Vehicle
@@ -81,18 +80,6 @@ def _clip_along(acceleration: Float, velocity: Float, speed: float, limit: float
 
 
 @nb.njit(cache=True)
-def _body_z(q: Float) -> Float:
-    """Body z (3,) of an attitude (4,) in the world."""
-    return np.array(
-        [
-            2.0 * (q[1] * q[3] + q[0] * q[2]),
-            2.0 * (q[2] * q[3] - q[0] * q[1]),
-            1.0 - 2.0 * (q[1] * q[1] + q[2] * q[2]),
-        ]
-    )
-
-
-@nb.njit(cache=True)
 def _still_to_come(body_z: Float, drag: Float, reference_acceleration: Float, gains: Gains) -> Float:
     """Velocity (3,), m/s, that the present tilt still gives beyond the reference while it is turned back."""
     excess = np.zeros(3)
@@ -116,7 +103,7 @@ def thrust_and_attitude(
     gains: Gains,
 ) -> tuple[float, Float]:
     """Specific thrust along body z, m/s², and wanted attitude (4,); see the module's equations."""
-    body_z = _body_z(q)
+    body_z = rotation_from_quaternion(q)[:, 2]
     speed = math.sqrt(velocity_mps[0] ** 2 + velocity_mps[1] ** 2 + velocity_mps[2] ** 2)
     drag = gains.drag_per_m * speed * velocity_mps
     correction = gains.position_per_s * (reference_position_m - position_m)

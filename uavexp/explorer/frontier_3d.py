@@ -53,7 +53,7 @@ from uavexp.types import Goal, Limits, Observation
 
 _ARRIVED_M, _ARRIVED_RAD, _DWELL_S = 0.35, 0.3, 0.5
 _DETOUR_M = 3.0  # by which the way there may be longer than to the cluster's nearest place
-_MOST_LEFT = 6  # by then it is a hundred metres
+_MOST_LEFT = 6  # times that the hysteresis is doubled: to a hundred metres
 _SAME_M = 1.0  # a cluster whose place is so near to the goal goes on where the goal was
 
 
@@ -97,9 +97,7 @@ class Frontier3d:
     # there are floors; no cell counts as more than 5 [ours]
     covered_share: Share = 0.3  # a goal is left when so little of what it shows is still unseen [ours]
     rethink_s: Positive = 1.0  # s, a goal is compared with others after so long [ours]
-    hysteresis_m: NonNegative = (
-        1.5  # m, that another goal must be better, and twice as much for each that was
-    )
+    hysteresis_m: NonNegative = 1.5  # m, that another goal must be better; doubled by each goal that
     # was left for another since one was looked at [ours]
     turn_m: NonNegative = 1.5  # m, that turning back in flight, and half a turn of the yaw, count as [ours]
     look_m: NonNegative = 5.0  # m, so near to a place the yaw is that with which it shows most; before, the

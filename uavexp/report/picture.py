@@ -140,14 +140,13 @@ def _finish_panel(axes: Axes, log: TrialLog, *, legend: bool = True) -> None:
 
 def _handles(world: World, log: TrialLog) -> list[Line2D | Patch]:
     low_m, high_m = plan_view.band_m(world)
+    # a judged recording has no shortest path, no plans and no map
     shortest = Line2D([], [], color=style.BLACK, lw=0.9, ls="--", label="true shortest path (3D)")
     plans = Line2D([], [], color=style.SKY, lw=1.0, label="plans")
     mapped = Line2D([], [], color=style.MAPPED, marker="s", ls="", ms=3, mew=0, label="mapped there")
     return [
         Line2D([], [], color=plan_view.SPEED_COLOURS(0.7), lw=2.2, label="flown"),
-        *(
-            [shortest] if len(world.shortest_path) > 1 else []
-        ),  # a judged recording has none, no plans, no map
+        *([shortest] if len(world.shortest_path) > 1 else []),
         *([plans] if any(len(replan.trajectory_m) for replan in log.replans) else []),
         Patch(color=style.SURFACE, label=f"true, z {low_m:.1f} to {high_m:.1f} m"),
         Patch(color=style.SOLID, label="solid or shut off there"),

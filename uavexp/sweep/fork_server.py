@@ -28,9 +28,7 @@ _TETHER = "uavexp.sweep.tether"
 _FOLDER = "uavexp-{}-"  # of the process of that number
 _LEFT = re.compile(r"uavexp-(\d+)-\w+")
 _SHORT = Path("/tmp")  # where a socket's name is not too long
-_LONGEST = 107 - len(
-    "/uavexp-4194304-12345678/listener-12345678"
-)  # of a folder for one: a socket's has 107 bytes
+_LONGEST = 107 - len("/uavexp-4194304-12345678/listener-12345678")  # bytes of a folder: a socket's has 107
 
 
 def start_fork_server(preload: Sequence[str] = ()) -> None:

@@ -28,6 +28,7 @@ from uavexp.explorer.volume.waves import (
     straight_cost,
     trace,
 )
+from uavexp.field import DistanceField
 
 SHAPE = (9, 8, 6)
 STEPS = steps_on(SHAPE)
@@ -213,22 +214,27 @@ def test_cells_follow_the_voxels() -> None:
     assert not len(cells.update())
 
 
+SIGHT = Sight(math.radians(45.0), math.radians(-36.8), math.radians(36.8), 4.5)
+
+
+def places_in(field: DistanceField, bounds_m: Float, clearance_m: float, radius_m: float) -> Places:
+    low_m, high_m = bounds_m
+    return Places(field.state, field.distance, field.origin_m, 0.1, 0.2, clearance_m, radius_m, low_m, high_m)
+
+
 def test_sight_ends_at_walls_and_at_what_was_not_seen() -> None:
     grid, unknown = empty((4.0, 3.0, 2.0)), empty((4.0, 3.0, 2.0))
     grid[20, :15] = True  # a wall at x = 2.0 m, up to y = 1.5 m
     unknown[30:] = True
     field = field_from(grid & ~unknown, unknown=unknown, max_distance_m=2.0)
     bounds_m = np.array([[0.3, 0.3, 0.3], [3.7, 2.7, 1.7]])
-    places = Places(
-        field.state, field.distance, field.origin_m, 0.1, 0.2, 0.28, 0.2, bounds_m[0], bounds_m[1]
-    )
-    sight = Sight(math.radians(45.0), math.radians(-36.8), math.radians(36.8), 4.5)
+    places = places_in(field, bounds_m, 0.28, 0.2)
     cells_m = np.array([[2.5, 1.0, 1.0], [2.5, 2.0, 1.0], [3.1, 2.0, 1.0], [3.6, 2.0, 1.0], [0.5, 2.0, 1.0]])
-    seen = seen_from(places, sight, np.array([1.0, 2.0, 1.0]), 0.0, cells_m)
+    seen = seen_from(places, SIGHT, np.array([1.0, 2.0, 1.0]), 0.0, cells_m)
     # behind the wall, free, the first unseen, behind unseen ones, behind the eye
     np.testing.assert_array_equal(seen, [False, True, True, False, False])
     count, yaws = look_from(
-        places, sight, np.array([[1.0, 2.0, 1.0], [2.2, 1.0, 1.0], [3.6, 2.0, 1.0]]), cells_m[4:], 0.7
+        places, SIGHT, np.array([[1.0, 2.0, 1.0], [2.2, 1.0, 1.0], [3.6, 2.0, 1.0]]), cells_m[4:], 0.7
     )
     np.testing.assert_array_equal(count, [1, 0, 0])  # the second stands too near the wall, the third unseen
     assert abs(yaws[0]) == pytest.approx(math.pi)
@@ -241,16 +247,13 @@ def test_eyes_that_see_much_less_than_the_best_see_none() -> None:
     unknown[22:] = True
     field = field_from(grid & ~unknown, unknown=unknown, max_distance_m=2.0)
     bounds_m = np.array([[0.2, 0.2, 0.2], [2.8, 2.8, 1.8]])
-    places = Places(
-        field.state, field.distance, field.origin_m, 0.1, 0.2, 0.15, 0.1, bounds_m[0], bounds_m[1]
-    )
-    sight = Sight(math.radians(45.0), math.radians(-36.8), math.radians(36.8), 4.5)
+    places = places_in(field, bounds_m, 0.15, 0.1)
     eyes_m = rng.uniform(bounds_m[0], bounds_m[1], (200, 3))
     cells_m = np.column_stack([np.full(16, 2.25), rng.uniform(0.3, 2.7, 16), rng.uniform(0.3, 1.7, 16)])
-    every, yaws = look_from(places, sight, eyes_m, cells_m, 0.0)
+    every, yaws = look_from(places, SIGHT, eyes_m, cells_m, 0.0)
     for eye_m, yaw, seen in zip(eyes_m, yaws, every, strict=True):
-        assert seen in (0, seen_from(places, sight, eye_m, yaw, cells_m).sum())
+        assert seen in (0, seen_from(places, SIGHT, eye_m, yaw, cells_m).sum())
     enough = every >= 0.7 * every.max()
     assert 3 < enough.sum() < (every > 0).sum() - 3
-    best, _ = look_from(places, sight, eyes_m, cells_m, 0.7)
+    best, _ = look_from(places, SIGHT, eyes_m, cells_m, 0.7)
     np.testing.assert_array_equal(best, np.where(enough, every, 0))

@@ -110,6 +110,34 @@ def test_the_acceleration_turns_no_faster_than_it_may() -> None:
     assert np.abs(jerk[:, 0]).max() <= 1.3 * most
 
 
+def weaving(jerk_mps3: float) -> Trajectory:
+    """At 1.5 m/s along x, swaying in y for 4 s with this jerk to and fro, 0.1 s each."""
+    signs, lasts_s = np.tile([1.0, -1.0, -1.0, 1.0], 10), 0.1
+    y = np.array([2.05, 0.0, 0.0])  # place, speed, acceleration
+    rows = np.zeros((40, 4, 3))
+    for n, jerk in enumerate(signs * jerk_mps3):
+        rows[n, 0] = 1.0 + 1.5 * lasts_s * n, y[0], 1.05
+        rows[n, 1] = 1.5, y[1], 0.0
+        rows[n, 2:, 1] = y[2] / 2.0, jerk / 6.0
+        y = np.array(
+            [
+                y[0] + lasts_s * (y[1] + lasts_s * (y[2] / 2.0 + lasts_s * jerk / 6.0)),
+                y[1] + lasts_s * (y[2] + lasts_s * jerk / 2.0),
+                y[2] + lasts_s * jerk,
+            ]
+        )
+    return Trajectory(breaks_s=np.arange(41) * lasts_s, coefficients=rows, at_rest=False)
+
+
+def test_where_a_plan_turns_the_thrust_too_fast_it_is_flown_slower() -> None:
+    """Jerk goes with the third power of the rate; what turns it gently enough keeps its pace."""
+    most = RULES.plan_turn_share * 9.81 * LIMITS.max_body_rate_radps
+    for share, rate in ((0.9, 1.0), (1.6, 1.6 ** (-1.0 / 3.0))):
+        pace = asked(weaving(share * most), hall()).pace
+        soon = (pace.own_s > 0.6) & (pace.own_s < 0.9)
+        np.testing.assert_allclose(pace.rate[soon], rate, atol=0.01)
+
+
 def test_a_plan_that_could_not_be_stopped_is_refused_and_a_slower_one_is_not() -> None:
     field = hall(seen_to_m=2.0)  # 0.77 m of way
     assert "2.40 m/s" in asked(straight(2.4), field).refused
