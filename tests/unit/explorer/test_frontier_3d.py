@@ -188,23 +188,71 @@ def test_a_start_of_which_not_all_around_was_seen_is_left() -> None:
     assert goal is not None
 
 
-def test_between_two_places_it_goes_to_and_fro_ever_less(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A tour that thinks of the other end of a gallery as 8 m nearer each time is not followed for ever."""
+def gallery() -> DistanceField:
+    """20 m long, the last two at both ends not seen."""
     size_m = (20.0, 4.0, 2.4)
     grid, unknown = empty(size_m), empty(size_m)
     grid[[0, -1]], grid[:, [0, -1]], grid[:, :, [0, -1]] = True, True, True
     unknown[:20], unknown[-20:] = True, True
-    field, explorer, asked = field_from(grid & ~unknown, unknown=unknown, max_distance_m=2.0), begun(), []
+    return field_from(grid & ~unknown, unknown=unknown, max_distance_m=2.0)
+
+
+def goes_east(explorer: Frontier3d, field: DistanceField, time_s: float) -> bool:
+    """From the middle of the gallery."""
     bounds_m = np.array([[0.4, 0.4, 0.4], [19.6, 3.6, 2.0]])
+    seen = replace(at(field, (10.0, 2.0, 1.2), time_s), flight_bounds_m=bounds_m)
+    return bool(chosen(explorer, seen).position_m[0] > 10.0)
+
+
+@pytest.fixture
+def biases(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """By how much the next tours think of the east as farther, m; the last one for all after it."""
+    biases: list[float] = []
 
     def fickle(ways: Ways, places: Int, first_m: Float, there_m: Float) -> Int:
-        asked.append(len(places))
-        east = ways.cells.centre_m(places)[:, 0] > 10.0
-        return np.argsort(first_m + 8.0 * (east == len(asked) % 2))
+        bias_m = biases.pop(0) if len(biases) > 1 else biases[0]
+        return np.argsort(first_m + bias_m * (ways.cells.centre_m(places)[:, 0] > 10.0))
 
     monkeypatch.setattr(Ways, "tour", fickle)
-    goals = []
-    for tick in range(12):
-        seen = replace(at(field, (10.0, 2.0, 1.2), float(tick)), flight_bounds_m=bounds_m)
-        goals.append(chosen(explorer, seen).position_m[0] > 10.0)
+    return biases
+
+
+def test_between_two_places_it_goes_to_and_fro_ever_less(biases: list[float]) -> None:
+    """A tour that thinks of the other end of a gallery as 8 m nearer each time is not followed for ever."""
+    field, explorer = gallery(), begun()
+    biases.extend([-8.0, 8.0] * 6)
+    goals = [goes_east(explorer, field, float(tick)) for tick in range(12)]
     assert (np.flatnonzero(np.diff(goals)) + 1).tolist() == [1, 2, 3]  # 1.5, 3 and 6 m do not keep it, 12 do
+
+
+def test_it_stays_by_a_hundred_metres_at_most(biases: list[float]) -> None:
+    field, explorer = gallery(), begun()
+    biases.extend([-200.0, 200.0] * 6)
+    assert np.diff([goes_east(explorer, field, float(tick)) for tick in range(12)]).all()
+
+
+@pytest.mark.parametrize("since", ["looked at", "no longer open", "a new trial", "nothing"])
+def test_once_a_goal_was_seen_the_next_is_as_easy_to_leave_as_the_first(
+    since: str, biases: list[float]
+) -> None:
+    field, explorer = gallery(), begun()
+    biases.extend([-20.0, 20.0, -20.0, 20.0, 0.0])
+    for tick in range(4):  # left for another thrice: 12 m keep it
+        goes_east(explorer, field, float(tick))
+    if since == "a new trial":
+        explorer.reset(1.2, LIMITS)
+    choice = explorer._choice
+    assert choice is None or choice.place_m[0] < 10.0
+    if since == "looked at":
+        for time_s in (3.2, 3.4, 3.6, 3.8, 4.0):
+            explorer.select(
+                replace(
+                    at(field, tuple(choice.place_m), time_s, yaw_rad=choice.yaw_rad),
+                    flight_bounds_m=np.array([[0.4, 0.4, 0.4], [19.6, 3.6, 2.0]]),
+                )
+            )
+    elif since == "no longer open":
+        explorer._space.cells.looked[choice.cells] = explorer.looks
+    biases[:] = [-8.0, 8.0, -8.0]
+    goals = [goes_east(explorer, field, 5.0 + tick) for tick in range(3)]
+    assert np.diff(goals).all() == (since != "nothing")

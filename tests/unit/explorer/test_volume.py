@@ -15,7 +15,7 @@ from uavexp.check.fields import empty, field_from
 from uavexp.explorer.volume.cells import CLOSED, EDGE, NARROW, OPEN, UNSEEN, Body, Cells
 from uavexp.explorer.volume.clusters import clusters_of
 from uavexp.explorer.volume.route import ANY, WIDE, optimistic
-from uavexp.explorer.volume.steps import Prices, steps_on
+from uavexp.explorer.volume.steps import Prices, prices, steps_on
 from uavexp.explorer.volume.views import Places, Sight, look_from, seen_from
 from uavexp.explorer.volume.waves import (
     FAR,
@@ -90,6 +90,33 @@ def test_costs_equal_scipys_and_follow_every_change(seed: int) -> None:
                 level = least_change(wave, STEPS, changed)
                 if level < FAR - 1:
                     forget(wave, level)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_costs_follow_changes_under_a_wave_that_was_not_at_its_end(seed: int) -> None:
+    """Asked for a near cell only, it leaves others waiting; the map changes, and it goes on."""
+    rng, size = np.random.default_rng(seed), int(np.prod(SHAPE))
+    kind, wave = random_kinds(rng), new_wave(size)
+    source = int(np.ravel_multi_index((4, 4, 3), SHAPE))
+    for price in (WIDE, PRICES):
+        begin(wave, source)
+        for _ in range(40):
+            expected = scipy_costs(kind, price, source)
+            cell = int(rng.choice(np.flatnonzero(np.isfinite(expected))))
+            np.testing.assert_array_equal(asked(wave, kind, price, range(cell, cell + 1)), expected[cell])
+            other = np.where(rng.random(SHAPE) < 0.02, random_kinds(rng), kind)
+            changed = np.flatnonzero(other != kind).astype(np.int32)
+            kind = other
+            level = least_change(wave, STEPS, changed) if len(changed) else FAR
+            if level < FAR - 1:
+                forget(wave, level)
+
+
+def test_only_prices_that_are_the_lengths_are_even() -> None:
+    open_or_not, flat = np.array([0.0, 1.0, 0.0]), np.ones(3)
+    assert prices(open_or_not, flat).even
+    assert not prices(open_or_not, np.array([1.0, 2.0, 1.0])).even
+    assert not prices(np.array([0.0, 1.5, 0.0]), flat).even
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -153,6 +153,30 @@ def test_a_slanted_wall_is_not_missed_for_the_width_of_a_pixel() -> None:
     assert seen(eye, cells, turned)[slanted].all()
 
 
+def test_the_noise_counts_along_the_normal() -> None:
+    """Exact images, judged by a noisy lens: off by 0.7 of the bound is shown square on, not on a slant."""
+    scene = Scene(make_world([([WALL_X_M, -90.0, -60.0], [WALL_X_M + 0.2, 90.0, 90.0])]))
+    camera = Camera(max_range_m=20.0, max_incidence_rad=math.radians(75.0))
+    for yaw_deg, expected in ((0.0, True), (64.0, False)):
+        eye = image_eye(scene, camera, axial_noise=False, quantisation=False, edge_missing=False)
+        eye.look(EYE_M, quaternion_from_yaw(math.radians(yaw_deg)), 0.0)
+        eye.lens.axial_noise, eye.lens.axial_noise_scale = True, 3.0
+        depth_m = (WALL_X_M - EYE_M[0]) / math.cos(math.radians(yaw_deg))
+        off_m = TOLERANCE_M + 0.7 * error_bound_m(depth_m, eye.lens.noise)
+        aside_m = depth_m * math.sin(math.radians(yaw_deg))
+        ahead = EYE_M + np.array([WALL_X_M - EYE_M[0], aside_m, 0.0])
+        cell = Surface(
+            point_m=ahead[None] + [off_m, 0.0, 0.0], normal=np.array([[-1.0, 0.0, 0.0]]),
+            area_m2=np.ones(1), curvature=np.zeros(1),
+        )  # fmt: skip
+        assert (len(eye.sees(cell, np.ones(1, dtype=np.bool_))) == 1) is expected
+
+
+def test_a_pixel_that_sees_beyond_range_shows_nothing_before_it() -> None:
+    scene = Scene(make_world([([30.0, -90.0, -60.0], [30.2, 90.0, 90.0])]))
+    assert not seen(image_eye(scene), wall_cells(), frames=3).any()
+
+
 @pytest.mark.parametrize("depth_m", [0.5, 1.5, 3.0, 4.5])
 def test_the_bound_holds_the_noise_and_little_more(depth_m: float) -> None:
     lens = lens_of(CAMERA, 96)

@@ -180,6 +180,17 @@ def test_all_blocked_viewpoints_gain_weight_not_only_the_next() -> None:
     assert differs, "and it matters here"
 
 
+def test_what_counts_as_blocked_is_what_no_plan_led_to_and_what_is_shown_but_not_what_was_visited() -> None:
+    _, guide = begun(rounds=0)
+    first, second, third = guide.plan.order[:3]
+    places = guide.plan.viewpoints.position_m
+    here = seen_at(0.0, state(START_M), with_balls(places[[second, third]]))
+    assert guide.select(here) is not None
+    guide.reject(places[first], 0.0)
+    guide.visited_s[second] = 0.0
+    assert guide._blocked_now(here)[[first, second, third]].tolist() == [True, False, True]
+
+
 def test_the_mission_ends_with_the_visit_and_reports_what_was_seen() -> None:
     mission, guide = begun()
     assert mission.outcome(flown(0.0, 0.1), seen_at(0.0, state(START_M))) is None
