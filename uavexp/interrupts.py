@@ -47,6 +47,8 @@ def exit_code_of(command: Callable[[], int]) -> int:
     except KeyboardInterrupt:
         sys.stderr.write("interrupted\n")
         return 130
+    finally:
+        leave_at_once()  # what was begun has ended
 
 
 def _is_refused(error: BaseException | None) -> bool:

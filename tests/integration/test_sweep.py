@@ -207,16 +207,17 @@ def test_a_dry_run_lists_what_is_left_and_writes_nothing(
 
 
 def test_a_second_sweep_on_a_folder_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    first = begin(*STUDY, "runner.n_jobs=1", f"out={tmp_path / 'shared'}")
+    long = (*QUICK, "strategy=mcr,tbr", "seed=0:300")  # it flies on until it is stopped
+    first = begin(*long, "runner.n_jobs=1", f"out={tmp_path / 'shared'}")
     assert first.stdout is not None
     first.stdout.readline()
-    assert main([*STUDY, f"out={tmp_path / 'shared'}"]) == 2
+    assert main([*long, f"out={tmp_path / 'shared'}"]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1
     assert f"another command (process {first.pid}) is flying into it" in error
     first.terminate()
-    first.communicate()
-    assert first.returncode == 130
+    told, error = first.communicate()
+    assert first.returncode == 130, told + error
 
 
 def test_a_trial_that_fails_costs_itself_alone_and_is_flown_again(tmp_path: Path) -> None:
