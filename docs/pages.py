@@ -2,6 +2,7 @@
 
     <!-- table: mcr/table1/table1 -->  ...  <!-- end -->             a table as its report made it
     <!-- number: mcr/table1 replans MCR -->7.4<!-- end -->            one mean, in a sentence
+    <!-- paired: mcr/table1 replans MCR - TBR -->+1.8 [0.9, 2.8], p = 0.01<!-- end -->    a paired difference
 
     <!-- table: mcr/table1                                            a table of one's own choice
     metrics: {success: success %, replans: replans}                   column of `values.csv`: how it is called
@@ -20,7 +21,7 @@ import csv
 import math
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -38,8 +39,8 @@ from uavexp.report.statistics import Interval
 
 ROOT = Path(__file__).parents[1]
 _END = "<!-- end -->"
-_BEGIN = re.compile(r"<!-- (?:table|number): ")
-_MARK = re.compile(rf"(<!-- (table|number): (.*?)\s*-->)(.*?)({_END})", re.S)
+_BEGIN = re.compile(r"<!-- (?:table|number|paired): ")
+_MARK = re.compile(rf"(<!-- (table|number|paired): (.*?)\s*-->)(.*?)({_END})", re.S)
 _KEYS = ("metrics", "arms", "rows", "means", "paper")
 Values = Mapping[tuple[str, str], ArmEstimate]  # metric column, arm -> what was found
 
@@ -83,7 +84,7 @@ def with_results(text: str) -> str:
     def filled(mark: re.Match[str]) -> str:
         head, kind, asked, _, end = mark.groups()
         try:
-            found = number_of(asked) if kind == "number" else f"\n\n{table_of(asked)}\n\n"
+            found = _FOUND[kind](asked)
         except (ConfigError, ValueError, OSError, TypeError, yaml.YAMLError) as error:
             raise ConfigError(f"{kind}: {asked.splitlines()[0]}: {one_line(error)}") from error
         return f"{head}{found}{end}"
@@ -97,6 +98,22 @@ def number_of(asked: str) -> str:
     """A mean: of `STUDY METRIC ARM`."""
     study, column, arm = asked.split(maxsplit=2)
     return number(_found(values_of(study), column, arm).mean, metrics_of([column])[0].digits)
+
+
+def paired_of(asked: str) -> str:
+    """A paired difference, its interval and corrected p: of `STUDY METRIC FIRST - SECOND`."""
+    study, column, arms = asked.split(maxsplit=2)
+    first, _, second = arms.partition(" - ")
+    label = metrics_of([column])[0].label
+    with (results_of(study) / "tables" / "paired_tests.csv").open(encoding="utf-8", newline="") as text:
+        rows = [row for row in csv.DictReader(text) if row["metric"] == label]
+    for row in rows:
+        if (row["first"], row["second"]) == (first, second):
+            p = row["p, Holm"] if "<" in row["p, Holm"] else f"= {row['p, Holm']}"
+            difference = row["first \N{MINUS SIGN} second [95 %]"].replace("-", "\N{MINUS SIGN}")
+            return f"{difference}, p {p.replace('<', '< ')}"
+    pairs = ", ".join(f"{row['first']} - {row['second']}" for row in rows)
+    raise ConfigError(f"no {column} of {arms}; there are {pairs or 'none'}")
 
 
 def table_of(asked: str) -> str:
@@ -173,6 +190,13 @@ def results_of(study: str) -> Path:
     """The committed folder of a study: `mcr/table1` is in `experiments/mcr/results/table1`."""
     paper, _, name = study.partition("/")
     return ROOT / "experiments" / paper / "results" / name
+
+
+_FOUND: Mapping[str, Callable[[str], str]] = {
+    "table": lambda asked: f"\n\n{table_of(asked)}\n\n",
+    "number": number_of,
+    "paired": paired_of,
+}
 
 
 if __name__ == "__main__":

@@ -12,6 +12,8 @@ import pytest
 from tests.folders import ROOT
 from uavexp.errors import ConfigError
 
+LABEL = "Success rate, SR [%]"
+
 
 @pytest.fixture(scope="module")
 def pages() -> ModuleType:
@@ -38,6 +40,16 @@ def test_the_readme_shows_what_the_committed_study_measured() -> None:
     assert float(shown[1]) == round(means["replans", "SSP"], 1)
 
 
+def test_a_paired_difference_stands_in_a_sentence_with_its_corrected_p(pages: ModuleType) -> None:
+    with (ROOT / "experiments/mcr/results/table1/tables/paired_tests.csv").open(encoding="utf-8") as text:
+        rows = {(row["first"], row["second"]): row for row in csv.DictReader(text) if row["metric"] == LABEL}
+    for second in ("TBR", "SSP"):
+        row = rows["MCR", second]
+        told = pages.with_results(f"<!-- paired: mcr/table1 success MCR - {second} -->?<!-- end -->")
+        assert row["first − second [95 %]"].replace("-", "−") in told
+        assert re.search(r", p (= |< )" + re.escape(row["p, Holm"].strip("<")) + "<!", told)
+
+
 def test_what_is_typed_over_a_number_is_put_right(pages: ModuleType) -> None:
     right = "MCR: <!-- number: mcr/table1 replans MCR -->7.4<!-- end --> replans"
     assert pages.with_results(right) == right
@@ -49,6 +61,10 @@ def test_what_is_typed_over_a_number_is_put_right(pages: ModuleType) -> None:
     [
         ("<!-- number: mcr/table1 replan MCR -->1<!-- end -->", "no replan of MCR; there are"),
         ("<!-- number: mcr/table1 replans mcr -->1<!-- end -->", "no replans of mcr; there are"),
+        (
+            "<!-- paired: mcr/table1 success TBR - TBR -->1<!-- end -->",
+            "no success of TBR - TBR; there are MCR",
+        ),
         ("<!-- number: mcr/nothing replans MCR -->1<!-- end -->", "No such file"),
         ("<!-- table: mcr/table1\nmetric: {replans: replans}\n-->\n<!-- end -->", "no such key: metric"),
         ("<!-- table: mcr/table1/table1 -->", "has no <!-- end -->"),
