@@ -78,6 +78,7 @@ from uavexp.types import Limits, Observation, Squeeze
 
 _SAMPLE_S = 0.02  # at 2.5 m/s half a voxel apart
 _MOST_SAMPLES = 400
+_APART = 1e-6  # samples between two that are not one
 _PERIODS_S = 0.2  # two ESDF updates: what was ahead is ahead until then
 _HERE_M = 1e-3  # so near, the vehicle is there already
 _NOISE_M = 0.01  # a smaller drop of the clearance is none
@@ -148,7 +149,7 @@ class _Commitment:
         squeeze: Squeeze | None = None,
     ) -> Flyable:
         """The fastest pace that rests within what is verified (`Guard.flyable`)."""
-        if start_s >= plan.end_s:
+        if start_s >= plan.end_s - _APART * _SAMPLE_S:
             return Flyable()
         ahead = self._ahead(plan, start_s)
         clearance_m, verified, bound_mps = self._verified(ahead, observation, squeeze)
@@ -183,8 +184,9 @@ class _Commitment:
     def _ahead(self, plan: Trajectory, start_s: float) -> _Ahead:
         """Samples of the plan for a stopping distance and what is spared."""
         # at the same places at every update, so that a rest at one of them comes
-        first = math.floor((start_s - plan.start_s) / _SAMPLE_S + 1e-6) + 1
-        count = min(math.ceil((plan.end_s - plan.start_s) / _SAMPLE_S), first + _MOST_SAMPLES)
+        first = math.floor((start_s - plan.start_s) / _SAMPLE_S + _APART) + 1
+        # none twice, nor where the plan ends, which comes last
+        count = min(math.ceil((plan.end_s - plan.start_s) / _SAMPLE_S - _APART), first + _MOST_SAMPLES)
         places_s = plan.start_s + _SAMPLE_S * np.arange(first, count, dtype=np.float64)
         own_s = np.concatenate([[start_s], places_s])
         if count < first + _MOST_SAMPLES:

@@ -85,6 +85,18 @@ def test_where_all_is_seen_and_clear_it_is_flown_as_planned() -> None:
     np.testing.assert_allclose(found.pace.own_s[short], found.pace.times_s[short])
 
 
+def test_a_plan_may_begin_and_end_at_any_time() -> None:
+    field, guard = hall(), RULES.begin(LIMITS)
+    seen = replace(observe(field, time_s=0.0), state=hovering(np.array([1.0, 2.05, 1.05])))
+    for start_s in np.arange(0.0, 60.0, 0.1):  # the last sample of some is their end, but for rounding
+        plan = straight(2.0, to_m=1.6)
+        plan = replace(plan, breaks_s=start_s + plan.breaks_s)
+        for now_s in (*np.arange(start_s, plan.end_s, 0.02), np.nextafter(plan.end_s, 0.0)):
+            pace = guard.flyable(plan, float(now_s), PLANNED, seen).pace
+            assert np.isfinite(pace.times_s).all()
+            assert (np.diff(pace.own_s) > 0.0).all()
+
+
 @pytest.mark.parametrize("seen_to_m", [2.0, 3.0, 4.0])
 def test_it_rests_before_what_was_not_seen_from_no_more_than_can_be_stopped(seen_to_m: float) -> None:
     plan = straight(1.2)
