@@ -50,3 +50,23 @@ def test_other_commands_that_still_load_end_in_one_line(command: str, delay_s: f
     _, error = process.communicate(timeout=120)
     if was_running and not error.startswith("error: "):  # it had said all, and was ending
         assert (process.returncode, error) == (130, "interrupted\n")
+
+
+def test_a_study_does_not_outlive_the_results_that_it_is_flown_for(tmp_path: Path) -> None:
+    """Told by its process id alone, as `kill` does: the study itself hears nothing."""
+    study = "import os, time; print(os.getpid(), flush=True); time.sleep(60)"
+    flies = (
+        "import sys; from uavexp.interrupts import *; from uavexp.results.__main__ import _ended; "
+        f"leave_at_once(); raise_from_now_on(); command = [sys.executable, '-c', {study!r}]; "
+        "sys.exit(exit_code_of(lambda: _ended(command)))"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", flies], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    pid = int(process.stdout.readline())
+    process.terminate()
+    _, error = process.communicate(timeout=60)
+    assert (process.returncode, error) == (130, "interrupted\n")
+    with pytest.raises(ProcessLookupError):
+        os.kill(pid, 0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import shlex
@@ -12,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from uavexp.errors import ConfigError
-from uavexp.interrupts import exit_code_of
+from uavexp.interrupts import exit_code_of, raise_from_now_on
 from uavexp.paths import checkout_root, outputs_root
 from uavexp.report.significance import ALPHA
 from uavexp.results.changes import Change, changes, verdict_changes
@@ -32,6 +33,7 @@ ONLY=WORD  the studies whose name holds the word
 The same command again goes on where it was; other code begins anew, in a folder of its own.
 """
 _CHANGES = "changes.md"
+_GRACE_S = 2.0
 _SHOWN = 12  # changes of a study at the terminal; the file has all
 
 
@@ -90,12 +92,25 @@ def _fly(one: Listed, folder: Path) -> bool:
     """Fly a command in a process of its own; whether every trial ran to its end."""
     _say(f"\n{one.study}")
     began_s = time.monotonic()
-    command = [sys.executable, "-m", "uavexp", *one.words, f"out={folder}"]
-    ended = subprocess.run(command, cwd=checkout_root(), check=False).returncode
+    raise_from_now_on()
+    ended = _ended([sys.executable, "-m", "uavexp", *one.words, f"out={folder}"])
     if ended < 0 or ended == 130:
         raise KeyboardInterrupt
     _say(f"{one.study}: {_clock(time.monotonic() - began_s)}, said to take {_clock(one.estimate_s)}")
     return ended == 0
+
+
+def _ended(command: Sequence[str]) -> int:
+    """Exit code of a command, which does not outlive this one."""
+    with subprocess.Popen(command, cwd=checkout_root()) as process:
+        try:
+            return process.wait()
+        except KeyboardInterrupt:
+            with contextlib.suppress(subprocess.TimeoutExpired):  # it may have heard the terminal itself
+                process.wait(_GRACE_S)
+            process.terminate()
+            process.wait()
+            raise
 
 
 def _changed(plan: Sequence[Listed], folder: Path) -> Iterator[str]:
