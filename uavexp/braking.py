@@ -79,6 +79,9 @@ def braking_trajectory(
         # recomputed from the durations so that the end velocity is zero to rounding
         wanted = -momentum / (0.5 * rise_s + constant_s + 0.5 * fall_s)
         durations = [rise_s, constant_s, fall_s]
+    if max(durations) < _SHORTEST_PIECE_S:  # it all but stands, and could stop at once
+        acceleration_mps2, velocity_mps, wanted = np.zeros(3), np.zeros(3), np.zeros(3)
+        durations = [_HOLD_S, 0.0, 0.0]
     return _pieces(time_s, position_m, velocity_mps, (acceleration_mps2, wanted), durations)
 
 

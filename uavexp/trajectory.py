@@ -12,6 +12,8 @@ import numpy as np
 
 from uavexp.arrays import Float, check_shape
 
+_NO_WAIT_S = 1e-6  # a shorter piece may have no length at the times that a flight has
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trajectory:
@@ -139,7 +141,7 @@ def join(first: Trajectory, second: Trajectory) -> Trajectory:
 
 def hover_before(trajectory: Trajectory, wait_s: float) -> Trajectory:
     """The trajectory begun `wait_s` later, standing at its start until then; it must start at rest."""
-    if wait_s <= 0.0:
+    if wait_s <= _NO_WAIT_S:
         return trajectory
     hover = np.zeros((1, *trajectory.coefficients.shape[1:]))
     hover[0, 0] = trajectory.coefficients[0, 0]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -41,6 +43,17 @@ def test_stops_in_the_stated_distance(speed: float) -> None:
 def test_is_close_to_the_shortest_stop_at_full_speed() -> None:
     ideal = 2.5**2 / (2.0 * 2.5)
     assert stopping_distance_m(2.5, LIMITS) < 1.15 * ideal
+
+
+@pytest.mark.parametrize("speed", [5e-8, 5e-9, 0.0])
+def test_who_could_stop_at_once_holds_its_place(speed: float) -> None:
+    agile = replace(LIMITS, max_body_rate_radps=1e4)
+    held = braking_trajectory(
+        3.0, np.array([1.0, -2.0, 1.5]), np.array([speed, 0.0, 0.0]), np.zeros(3), agile
+    )
+    position, velocity, _ = sampled(held)
+    np.testing.assert_allclose(position - position[0], 0.0, atol=1e-8)
+    np.testing.assert_allclose(velocity, 0.0, atol=1e-7)
 
 
 vectors = st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))

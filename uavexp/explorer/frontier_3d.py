@@ -229,24 +229,26 @@ class Frontier3d:
         if choice.is_target:
             return True
         wanted = space.cells.still_wanted(choice.cells) & (space.cells.looked[choice.cells] < self.looks)
-        return bool(wanted.mean() > self.covered_share and space.viewpoints.is_place(choice.place_m))
+        shows = len(wanted) > 0 and wanted.mean() > self.covered_share
+        return bool(shows and space.viewpoints.is_place(choice.place_m))
 
     def _chosen(self, space: Space, observation: Observation) -> _Choice | None:
         """The target if seen cells lead there, else the best place; over worse ways if there is no other."""
         here_m, target_m = observation.state.position_m, observation.target_m
         clusters = space.viewpoints.clusters(self.looks, here_m)
-        for known in (WIDE, NARROWER, ANY):
-            space.ways.begin(space.cell_of(here_m), known)
-            to_target_m = space.to_target_m()
-            if target_m is not None and math.isfinite(to_target_m) and not self._aside_of(target_m[None])[0]:
-                return self._bound_for(space, observation, target_m, -to_target_m)
-            choice = self._best(space, observation, clusters)
-            if choice is not None:
-                return choice
-        if not clusters or not self._aside:
-            return None
-        self._aside.pop(0)  # what was set aside is tried again before all is given up
-        return self._chosen(space, observation)
+        while True:
+            for known in (WIDE, NARROWER, ANY):
+                space.ways.begin(space.cell_of(here_m), known)
+                to_target_m = space.to_target_m()
+                leads = target_m is not None and math.isfinite(to_target_m)
+                if target_m is not None and leads and not self._aside_of(target_m[None])[0]:
+                    return self._bound_for(space, observation, target_m, -to_target_m)
+                choice = self._best(space, observation, clusters)
+                if choice is not None:
+                    return choice
+            if not clusters or not self._aside:
+                return None
+            self._aside.pop(0)  # what was set aside is tried again before all is given up
 
     def _bound_for(
         self, space: Space, observation: Observation, place_m: Float, score: float,

@@ -175,7 +175,7 @@ class TourGuide:
         left = [stop for stop in self._order if self._is_open(stop)]
         if not left and not self._finished:
             self._go_on(observation)
-            left = self._order
+            left = [stop for stop in self._order if self._is_open(stop)]
         ready = [stop for stop in left if self._after_s[stop] <= observation.time_s]
         if not ready or free(ready[0]):
             self._waiting_s = math.inf

@@ -15,6 +15,7 @@ from uavexp.types import Decision, Goal, Observation, PlanResult, PlanStatus
 _NEAR_M, _CHANGED_M = 2.0, 0.15  # r_mon and delta_map of paper 1
 NO_GOAL = PlanResult(status=PlanStatus.NO_PATH, reason="no goal is reachable")
 _SAMPLE_S = 0.1  # spacing of the samples kept of a trajectory
+_AT_ONCE = 256
 
 
 def replan_of(
@@ -93,5 +94,5 @@ def _samples(trajectory: Trajectory, from_s: float) -> Float:
 
 def _path_change_m(old_m: Float, new_m: Float) -> float:
     """Largest distance of a point of the old path from the new path (one-sided Hausdorff)."""
-    between_m = np.linalg.norm(old_m[:, None] - new_m[None], axis=2)
-    return float(between_m.min(axis=1).max())
+    parts = np.array_split(old_m, math.ceil(len(old_m) / _AT_ONCE))  # a slow plan has thousands of samples
+    return max(float(np.linalg.norm(part[:, None] - new_m[None], axis=2).min(axis=1).max()) for part in parts)

@@ -55,7 +55,8 @@ class Judged:
 
 def chance_of_stop(clearance_m: Float, safe_m: float, body_radius_m: float) -> Float:
     """Of places by their mapped distances, m: 0 from the safe one on, 1 at the body's radius [ours]."""
-    return np.clip((safe_m - clearance_m) / (safe_m - body_radius_m), 0.0, 1.0) ** 4
+    span_m = max(safe_m - body_radius_m, _NOISE_M)  # a body larger than what is held for safe
+    return np.clip((safe_m - clearance_m) / span_m, 0.0, 1.0) ** 4
 
 
 def places_aside(point_m: Float, velocity_mps: Float, reach_m: float) -> Float:

@@ -226,6 +226,7 @@ def test_cells_follow_the_voxels() -> None:
     }  # fmt: skip
     kinds = [OPEN, NARROW, EDGE, UNSEEN, CLOSED, CLOSED]
     assert [int(cells.kind[cell]) for cell in at.values()] == kinds
+    assert cells.clearest_m(np.zeros(0, np.int64)).shape == (0, 3), "a way of one cell has no cells between"
     assert set(np.flatnonzero(cells.kind)) == set(changed.tolist())
     frontier = cells.frontier(1)
     assert len(frontier)

@@ -201,6 +201,7 @@ def test_a_hover_before_a_flight_shifts_it_and_nothing_else() -> None:
     np.testing.assert_allclose(evaluate(later, np.array([flown.start_s + 0.3]))[0][0], START)
     assert later.start_s == flown.start_s
     assert hover_before(flown, 0.0) is flown
+    assert hover_before(flown, 2.5e-16) is flown, "it would end when it begins"
 
 
 @pytest.mark.parametrize("trigger", [Ssp(), Mcr(), Tbr(interval_s=100.0)], ids=["ssp", "mcr", "tbr"])

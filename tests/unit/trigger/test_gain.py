@@ -46,6 +46,13 @@ class TestChanceOfAStop:
         clearance_m = np.array([0.9, 0.75, 0.5 * (0.75 + RADIUS_M), RADIUS_M, 0.0])
         np.testing.assert_allclose(chance_of_stop(clearance_m, 0.75, RADIUS_M), [0.0, 0.0, 1 / 16, 1.0, 1.0])
 
+    def test_is_a_chance_also_for_a_body_as_large_as_what_is_held_for_safe(self) -> None:
+        clearance_m = np.linspace(-0.1, 1.0, 12)
+        for safe_m in (RADIUS_M, 0.5 * RADIUS_M):
+            chance = chance_of_stop(clearance_m, safe_m, RADIUS_M)
+            assert (chance[clearance_m >= safe_m] == 0.0).all()
+            assert (chance[clearance_m <= safe_m - 0.01] == 1.0).all()
+
     def test_places_aside_lie_level_across_the_way(self) -> None:
         way = places_aside(np.array([[1.0, 2.0, 1.0]]), np.array([[0.0, 2.0, 0.5]]), 0.4)[0]
         np.testing.assert_allclose(way[:, 1:], [[2.0, 1.0]] * 9)

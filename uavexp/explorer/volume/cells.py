@@ -248,8 +248,8 @@ class Cells:
     def clearest_m(self, cells: Int) -> Float:
         """Centres (F, 3) of the clearest voxels of flat cells (F,)."""
         first = (self.index(cells) - 1) * self.size
-        voxel = np.array([_clearest(self.field.distance, (i, j, k), self.size) for i, j, k in first])
-        return np.asarray(self.field.origin_m + (voxel + 0.5) * self.field.voxel_size_m)
+        voxel = [_clearest(self.field.distance, (i, j, k), self.size) for i, j, k in first]
+        return np.asarray(self.field.origin_m + (np.reshape(voxel, (-1, 3)) + 0.5) * self.field.voxel_size_m)
 
     def of(self, points_m: Float) -> Int:
         """Flat cells (P,) that hold points (P, 3); the nearest ones of points outside."""

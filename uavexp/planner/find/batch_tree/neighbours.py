@@ -53,7 +53,7 @@ def sort_into_cells(states: Float, count: int, radius_m: float) -> Neighbours:
     while True:
         for k in range(3):
             shape[k] = int((high[k] - low[k]) / cell) + 1
-        if shape[0] * shape[1] * shape[2] <= _MOST_CELLS:
+        if float(shape[0]) * float(shape[1]) * float(shape[2]) <= _MOST_CELLS:  # integers would wrap around
             break
         cell *= 1.5
     place = np.empty(count, dtype=np.int64)

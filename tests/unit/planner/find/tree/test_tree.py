@@ -145,6 +145,13 @@ def test_neighbours_are_those_of_brute_force() -> None:
         assert found == set(np.flatnonzero(apart <= 0.7).tolist())
 
 
+def test_neighbours_within_no_radius_are_those_at_the_same_place_however_large_the_tree() -> None:
+    states = np.random.default_rng(2).uniform(0.0, 30.0, (50, 6))
+    states[7] = states[3]
+    cells, out = sort_into_cells(states, 50, 0.0), np.empty(50, dtype=np.int64)
+    assert set(out[: neighbours_within(cells, states, 3, out)].tolist()) == {3, 7}
+
+
 def test_a_batch_leaves_the_shortest_path_of_its_graph() -> None:
     # one batch with every sample a neighbour of every other: the visibility graph of the samples
     from scipy.sparse.csgraph import dijkstra
