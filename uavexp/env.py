@@ -75,7 +75,10 @@ class ReplanEnv(gymnasium.Env[Float32, int]):  # type: ignore[misc]
         self._cell, _, self._own = one_trial(overrides, config_dir, values)
         self._metrics = own_metrics(self._cell.metrics)
         self._weights = dict(WEIGHTS if weights is None else weights)
-        columns = {metric.column for metric in (*METRICS, *self._metrics)}
+        columns = {metric.column for metric in (*METRICS, *self._metrics)} - {
+            "outcome",
+            "scene_kind",
+        }  # texts
         for column in self._weights:
             if column not in columns:
                 raise ConfigError(f"weights: no metric {column}; there are {', '.join(sorted(columns))}")

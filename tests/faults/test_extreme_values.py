@@ -49,6 +49,10 @@ def test_it_is_refused_before_anything_is_made(typed: str) -> None:
         ("controller=flatness controller.drag_kgpm=2", "at most 1.18 kg/m can be flown"),
         ("vehicle=quadrotor vehicle.drag_coefficient=1e6", "at most 1.18 kg/m can be flown"),
         ("controller.velocity_gain_per_s=1e4", "must be at most rate_hz = 100"),
+        ("mapping.forget_s=1e-20", "forget_s must be >= 0.1"),
+        ("mapping.hit_evidence=32", "hit_evidence must be 1 to 31"),
+        ("mapping.miss_evidence=9223372036854775807", "miss_evidence must be 1 to 31"),
+        ("world=multilevel world.size_m=[2.25,6.06,8.46] world.hatch_m=0.85", "must be at least 2.4 m long"),
         ("planner=rrtstar planner.find=ompl_rrtstar planner.find.goal_bias=0", "must be 0.001 to 1"),
     ],
 )

@@ -16,6 +16,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+import uavexp
 from tests.sweeps import QUICK, assert_same_study, begin, records, run
 from uavexp.__main__ import main
 from uavexp.config.composition import Composer
@@ -218,6 +219,14 @@ def test_a_second_sweep_on_a_folder_is_refused(tmp_path: Path, capsys: pytest.Ca
     first.terminate()
     told, error = first.communicate()
     assert first.returncode == 130, told + error
+
+
+def test_a_study_in_which_nobody_asked_for_a_plan_can_be_read(tmp_path: Path) -> None:
+    assert (
+        main([*QUICK, "strategy=mcr", "seed=0:2", "mission.tolerance_m=1000", f"out={tmp_path / 'there'}"])
+        == 0
+    )
+    assert len(uavexp.read_study(tmp_path / "there").replans) == 0
 
 
 def test_a_trial_that_fails_costs_itself_alone_and_is_flown_again(tmp_path: Path) -> None:

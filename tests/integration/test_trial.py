@@ -13,6 +13,9 @@ import numpy as np
 import pytest
 
 import uavexp
+from uavexp.config.build import build
+from uavexp.config.composition import Composer
+from uavexp.config.overrides import parse_settings
 from uavexp.errors import ConfigError
 from uavexp.geometry import rotation_from_quaternion
 from uavexp.planner.find_and_shape import FindAndShape
@@ -42,6 +45,17 @@ def test_reaches_the_target_without_contact(flown: Any) -> None:
     assert flown.metrics["success"] is True
     end_m = flown.log.steps.position_m[-1]
     assert np.linalg.norm(end_m - flown.world.target_m) <= 0.3
+
+
+def test_goals_are_chosen_at_the_rate_of_the_mission_if_it_chooses_them() -> None:
+    rates = [
+        build(Composer().command(parse_settings(typed.split())).cells[0].config).tick_steps()[2]
+        for typed in (
+            "strategy=inspect explorer.rate_hz=10", "strategy=inspect mission.rate_hz=10",
+            "strategy=mcr explorer.rate_hz=10",
+        )
+    ]  # fmt: skip
+    assert rates == [20, 10, 10], "steps of 0.01 s"
 
 
 def test_log_rows_are_one_step_apart_and_begin_at_the_start(flown: Any) -> None:

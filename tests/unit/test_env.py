@@ -99,6 +99,7 @@ def test_between_steps_the_learner_may_draw(env):
         ({"seed": 3}, "seeds come with reset"),
         ({"trigger": "mcr"}, "the trigger is the agent"),
         ({"weights": {"succes": 1.0}}, "no metric succes"),
+        ({"weights": {"outcome": 1.0}}, "no metric outcome"),
         ({"world": "roms"}, "did you mean 'rooms'"),
     ],
 )

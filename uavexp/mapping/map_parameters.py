@@ -12,7 +12,9 @@ from uavexp.arrays import Float
 from uavexp.errors import require
 from uavexp.mapping.esdf import distance_table
 from uavexp.mapping.occupancy import LARGEST_EVIDENCE, FusionRule, OccupancyMap
-from uavexp.parameters import Count, Positive, between
+from uavexp.parameters import FINITE, Count, Positive, at_least, between
+
+Evidence = Annotated[int, between(1, LARGEST_EVIDENCE)]
 
 
 @dataclass(slots=True, kw_only=True)
@@ -40,13 +42,17 @@ class MapParameters(FieldParameters):
     # so that sheets stay [ours]
     solid_depth_m: Positive = 0.25  # m behind a surface that become occupied;
     # half a voxel less than truncation_m [ours]
-    hit_evidence: Count = 2  # counts a hit adds; 2 to 1: an object hit in a third of the frames stands [ours]
-    miss_evidence: Count = 1  # counts a miss takes away [ours]
+    hit_evidence: Evidence = (
+        2  # counts a hit adds; 2 to 1: an object hit in a third of the frames stands [ours]
+    )
+    miss_evidence: Evidence = 1  # counts a miss takes away [ours]
     occupied_evidence: Count = 4  # counts that make a voxel occupied: two hits, so no speckle does [ours]
-    max_evidence: Annotated[int, between(1, LARGEST_EVIDENCE)] = 12  # counts at most (<= 31);
+    max_evidence: Evidence = 12  # counts at most (<= 31);
     # what was removed is forgotten after 12 misses, 0.6 s [ours]
 
-    forget_s: Positive | None = None  # s after which what is no longer seen is unknown again, against
+    forget_s: Annotated[float, at_least(0.1), FINITE] | None = (
+        None  # s after which what is no longer seen is unknown again, against
+    )
     # drift (a voxel seen for fewer than max_weight frames sooner); null: never [ours]
 
     def __post_init__(self) -> None:

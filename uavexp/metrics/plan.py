@@ -20,6 +20,7 @@ from uavexp.log import TrialLog
 from uavexp.metrics import voxel_path
 from uavexp.metrics.metric import Flight, Measure, Metric, Metrics
 from uavexp.trajectory import Trajectory, evaluate
+from uavexp.types import PlanStatus
 
 GRID_S = 1e-3
 CHECKPOINTS = tuple(n * 10**k for k in range(5) for n in (10, 15, 20, 30, 50, 70))  # iterations
@@ -141,7 +142,9 @@ METRICS: Metrics = {
     ),
     # of the search: nodes expanded, edges taken, samples
     _metric("plan_iterations", "Iterations", digits=0): _of(
-        lambda plan: plan.log.replans[0].expansions if plan.log.replans else math.nan
+        lambda plan: next(
+            (one.expansions for one in plan.log.replans if one.status is PlanStatus.OK), math.nan
+        )
     ),
     _metric("plan_path_height_reversals", "Reversals of height", better=-1): _of(
         lambda plan: voxel_path.height_reversals(plan.path_m, SWING_M)

@@ -37,7 +37,7 @@ def derivative(values: Float, step_s: float, order: int, window_s: float = WINDO
     Source: Savitzky and Golay, Analytical Chemistry 36(8), 1964.
     """
     count = values.shape[0]
-    half = min(round(0.5 * window_s / step_s), (count - 1) // 2)
+    half = min(max(round(0.5 * window_s / step_s), 2), (count - 1) // 2)
     if half < 2:
         return np.zeros((0, values.shape[1]))
     offsets = np.arange(-half, half + 1)

@@ -133,6 +133,8 @@ def no_worse_in_any_scene(results: Results, *, arms: Sequence[str], metric: Metr
         return Verdict.NOT_TESTABLE, "a single scene"
     gain = metric.better * pairs.columns[metric.column] @ (1.0, -1.0)
     own = [gain[pairs.scene == number] for number in range(len(scenes))]
+    if not all(np.isfinite(some).any() for some in own):
+        return Verdict.NOT_TESTABLE, "a scene without a world that both arms have flown"
     worse = [name for name, some in zip(scenes, own, strict=True) if np.nansum(some) < 0.0]
     p = holm(np.array([sign_flip_p(some, np.arange(some.size), "less") for some in own]))
     shown = np.nanmin(p, initial=1.0) < ALPHA
@@ -226,7 +228,7 @@ class _Rival:
     @property
     def p(self) -> float:
         """All three must hold: the largest of their p values (Berger 1982, intersection-union test)."""
-        return max(self.success.p, self.clearance.p, self.replans.p)
+        return float(np.max([self.success.p, self.clearance.p, self.replans.p]))  # NaN when one is
 
     def loses(self, success_percent: float, clearance_m: float) -> bool:
         """Whether an interval rules one of the three out."""

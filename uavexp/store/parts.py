@@ -74,7 +74,7 @@ _TEXT_COLUMNS = (
 )
 _NUMBER_COLUMNS = (*_NUMBERS, "seed", "number", "effective_s", "path_change_m")
 _TRIALS_NEED = ("trial", "seed", "outcome", "success", "completion_time_s")
-_REPLANS_NEED = ("trial", "number", "effective_s", "cause", "status", "path_change_m")
+REPLANS_NEED = ("trial", "number", "effective_s", "cause", "status", "path_change_m")
 _NEVER_EMPTY = ("trial", "seed")
 _FILE_COLUMNS = ("trial", "world_digest")  # which name files
 
@@ -160,7 +160,7 @@ def check_table(path: Path, table: pd.DataFrame, axes: Mapping[str, Any] | None)
 
     for column in table.columns[table.columns.duplicated()]:
         refuse(column, "is there twice")
-    for column in _REPLANS_NEED if axes is None else (*_TRIALS_NEED, *(axes if len(table) else ())):
+    for column in REPLANS_NEED if axes is None else (*_TRIALS_NEED, *(axes if len(table) else ())):
         if column not in table:
             refuse(column, "is missing")
     for column in {*_NEVER_EMPTY} & {*table.columns}:

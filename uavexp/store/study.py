@@ -25,7 +25,7 @@ from uavexp.errors import RecordError, one_line
 from uavexp.log import TrialLog
 from uavexp.store.files import json_of, opened
 from uavexp.store.logs import read_log
-from uavexp.store.parts import check_study, check_table, is_run, is_wall
+from uavexp.store.parts import REPLANS_NEED, check_study, check_table, is_run, is_wall
 from uavexp.store.records import LOG, WALL, canonical_json, cell_digest, read_record, trial_name
 from uavexp.store.table import (
     FIRST_OF_REPLANS,
@@ -181,7 +181,8 @@ def collect(folder: Path) -> list[Row]:
     trials.sort(key=lambda trial: trial[:2])
     rows = with_every_cause([row for _, _, row, _ in trials])
     write_table(folder / TABLE, rows)
-    write_table(folder / REPLANS, [row for *_, replans in trials for row in replans], FIRST_OF_REPLANS)
+    replans = [row for *_, own in trials for row in own]
+    write_table(folder / REPLANS, replans, FIRST_OF_REPLANS if replans else REPLANS_NEED)
     return rows
 
 

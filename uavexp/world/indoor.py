@@ -50,7 +50,7 @@ class Indoor(ABC):
         require(
             min(size[:2]) >= least, f"size_m must be at least {least:g} m long and wide, got {list(size)}"
         )
-        require(max(size[:2]) <= 200.0, f"size_m must be at most 200 m long and wide, got {list(size)}")
+        require(max(size) <= 200.0, f"size_m must be at most 200 m long, wide and high, got {list(size)}")
         require(
             low < self.flight_height_m < size[2] - low,
             f"flight_height_m must lie between {low:g} m and {low:g} m under the ceiling at {size[2]:g} m, "

@@ -21,6 +21,7 @@ BAY_M = 1.8  # rack length between uprights
 RAIL_M = (0.04, 1.0)  # of the rail on both long sides of a hatch: thickness, height
 PASSAGE_M = 1.4  # gap in every row
 RACK_HEADROOM_M = 0.35  # from a row to the ceiling of its storey
+END_M = 1.0  # kept free at both ends of a storey
 DUCT_M = 0.3  # side of the duct under each ceiling
 TASK_ATTEMPTS = 40  # drawings of start and target in one geometry
 
@@ -50,6 +51,8 @@ class Multilevel(indoor.Indoor):
 
     def __post_init__(self) -> None:
         indoor.Indoor.__post_init__(self)
+        least = 2.0 * END_M + DUCT_M + 0.1
+        require(self.size_m[0] >= least, f"size_m must be at least {least:g} m long, got {list(self.size_m)}")
         aisle = self._aisle_m()
         require(
             aisle >= 2.0 * self.clearance_m + 0.1,
@@ -111,7 +114,7 @@ class Multilevel(indoor.Indoor):
             passage = begin + (end - begin - PASSAGE_M) * rng.uniform(0.1, 0.9)
             for stretch in ((begin, passage), (passage + PASSAGE_M, end)):
                 self._rack(boxes, rng, stretch, front, (floor, ceiling - RACK_HEADROOM_M))
-        x = float(rng.uniform(1.0, length - 1.0 - DUCT_M))
+        x = float(rng.uniform(END_M, length - END_M - DUCT_M))
         boxes.span((x, 0.0, ceiling - DUCT_M), (x + DUCT_M, width, ceiling))
 
     def _rack(

@@ -116,6 +116,13 @@ class TestSmoothness:
         scale = np.abs(expected).max()
         np.testing.assert_allclose(derivative(values, 0.01, order), expected, atol=1e-9 * scale)
 
+    def test_long_steps_have_a_window_of_five(self):
+        from scipy.signal import savgol_filter
+
+        values = np.random.default_rng(1).normal(size=(51, 3))
+        expected = savgol_filter(values, 5, 3, deriv=1, delta=0.1, axis=0, mode="interp")
+        np.testing.assert_allclose(derivative(values, 0.1, 1), expected, atol=1e-9 * np.abs(expected).max())
+
     def test_hovering_and_straight_flight_cost_nothing(self):
         values = evaluate(make_log(line, line_velocity), WORLD)
         assert values["acceleration_integral_m2ps3"] == pytest.approx(0.0, abs=1e-18)
@@ -247,6 +254,15 @@ class TestReplans:
     def test_useful_replans_change_the_path(self):
         assert self.evaluate(*self.REPLANS)["useful_replans"] == 2
         assert self.evaluate(*self.REPLANS, useful_change_m=0.4)["useful_replans"] == 1
+
+    def test_the_search_is_that_of_the_first_plan_found(self):
+        asked = (make_replan(0.0, "first", ok=False, expansions=7), make_replan(0.2, "retry", expansions=9))
+        way = np.array([[[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]])
+        log = make_log(line, line_velocity, replans=asked)
+        path_m = np.stack([way[0, 0], way[0].sum(axis=0)])
+        found = replace(log.first_plan, breaks_s=np.array([0.2, 1.2]), coefficients=way, path_m=path_m)
+        values = evaluate(replace(log, first_plan=found), WORLD)
+        assert values["plan_iterations"] == 9
 
     def test_share_near_a_change_leaves_the_first_plan_out(self):
         values = self.evaluate(

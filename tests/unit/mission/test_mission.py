@@ -103,6 +103,19 @@ def test_seen_share_is_nothing_or_all(hall: World, seen: int, share: float) -> N
     so_far = seen_so_far(field, cells_m, halves)
     assert so_far[-1] == so_far[1] == share
     assert so_far[0] <= share
+    nothing_m = reachable_m(hall, Scene(hall), replace(LIMITS, body_size_m=(90.0, 90.0, 0.12)))
+    assert nothing_m.shape == (0, 3)
+    assert np.isnan(seen_share(field, nothing_m))
+    assert np.isnan(seen_so_far(field, nothing_m, halves)).all()
+
+
+def test_a_flight_at_one_height_has_a_reachable_volume(hall: World) -> None:
+    low, high = hall.flight_bounds_m
+    at_m = hall.start_m[2]
+    level = replace(hall, flight_bounds_m=np.array([[*low[:2], at_m - 0.01], [*high[:2], at_m + 0.01]]))
+    cells_m = reachable_m(level, Scene(level), LIMITS)
+    assert len(cells_m) > 0
+    np.testing.assert_allclose(cells_m[:, 2], at_m)
 
 
 def test_home_is_flown_to_when_nothing_is_left_and_ends_the_mission(hall: World) -> None:

@@ -246,6 +246,15 @@ class TestTradeoff:
         curves = curves_of(Results(study=study))
         assert [curve.arms for curve in curves] == [("MCR",), ("MCR literal",)]
 
+    @pytest.mark.parametrize("failed", [("SSP",), ("SSP", "MCR")])
+    def test_an_arm_of_which_nothing_is_known_leaves_the_others_in_view(self, tmp_path, failed):
+        arms = ("SSP", "MCR")
+        table = rows_of(arms, ("a", "b"), 2, success=True, min_clearance_m=0.4, replans=3.0)
+        table.loc[table["arm"].isin(failed), ["min_clearance_m", "replans"]] = np.nan
+        study = made_up(tmp_path, table, {"arm": arms, "scene": ("a", "b")}, report=shipped("mcr/thresholds"))
+        for drawing in Report(study=study).drawings():
+            assert all(np.isfinite(axes.get_xlim()).all() for axes in drawing.figure.axes)
+
 
 def test_policies_show_the_shares_of_causes_and_of_useful_replans(tmp_path):
     arms = ("MCR", "TBR")

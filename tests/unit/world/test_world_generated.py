@@ -142,6 +142,7 @@ def test_what_cannot_be_joined_is_an_error_that_names_the_parameter(
         {"size_m": [26.0, float("nan"), 3.0]},
         {"size_m": [1.0, 16.0, 3.0]},
         {"size_m": [1e6, 16.0, 3.0]},
+        {"size_m": [26.0, 16.0, 1e7]},
         {"flight_height_m": 2.9},
         {"flight_height_m": float("nan")},
         {"clearance_m": 0.0},

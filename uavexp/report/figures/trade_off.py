@@ -150,7 +150,7 @@ def _lowest_percent(panel: Panel) -> float:
 
 def _finish(axes: Axes, metric: Metric, panel: Panel) -> None:
     """Scale the axis of replans to what is shown: with room for none at all only if an arm had none."""
-    means = [estimate(panel, REPLANS, arm).mean for arm in panel.arms]
+    means = [mean for arm in panel.arms if np.isfinite(mean := estimate(panel, REPLANS, arm).mean)]
     least, most = min(means, default=0.0), 1.5 * max([*means, 1.0])
     if least < 2.0 * _LINEAR_BELOW:
         axes.set_xscale("symlog", linthresh=_LINEAR_BELOW, linscale=0.35)
