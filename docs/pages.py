@@ -109,9 +109,9 @@ def paired_of(asked: str) -> str:
         rows = [row for row in csv.DictReader(text) if row["metric"] == label]
     for row in rows:
         if (row["first"], row["second"]) == (first, second):
-            p = row["p, Holm"] if "<" in row["p, Holm"] else f"= {row['p, Holm']}"
+            p = row["p, Holm"].replace("<", "< ")
             difference = row["first \N{MINUS SIGN} second [95 %]"].replace("-", "\N{MINUS SIGN}")
-            return f"{difference}, p {p.replace('<', '< ')}"
+            return f"{difference}, p {p if '<' in p else f'= {p}'}"
     pairs = ", ".join(f"{row['first']} - {row['second']}" for row in rows)
     raise ConfigError(f"no {column} of {arms}; there are {pairs or 'none'}")
 

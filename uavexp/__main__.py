@@ -6,16 +6,10 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
-from typing import NoReturn
 
 from uavexp import __version__
 from uavexp.errors import ConfigError
-from uavexp.interrupts import exit_code_of, leave_at_once
-
-
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        raise ConfigError(f"{message}; see --help")
+from uavexp.interrupts import Parser, exit_code_of, leave_at_once
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -38,7 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _parse(arguments: Sequence[str]) -> argparse.Namespace:
-    parser = _Parser(prog="uavexp", add_help=False, allow_abbrev=False)
+    parser = Parser(prog="uavexp", add_help=False, allow_abbrev=False)
     parser.add_argument("overrides", nargs="*")
     parser.add_argument("-h", "--help", action="store_true")
     parser.add_argument("-m", "--multirun", action="store_true")

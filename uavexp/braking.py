@@ -69,11 +69,7 @@ def braking_trajectory(
     fall_s = deceleration / jerk
     speed = float(np.linalg.norm(momentum))
     if speed <= 1e-9:  # the ramp to zero acceleration alone stops the vehicle, or it stands
-        durations, wanted = [max(rise_s, _HOLD_S), 0.0, 0.0], np.zeros(3)
-        if rise_s < _SHORTEST_PIECE_S:
-            acceleration_mps2, velocity_mps = np.zeros(3), np.zeros(3)
-        else:
-            durations[0] = rise_s
+        durations, wanted = [rise_s, 0.0, 0.0], np.zeros(3)
     else:
         constant_s = max(speed / deceleration - 0.5 * (rise_s + fall_s), 0.0)
         # recomputed from the durations so that the end velocity is zero to rounding

@@ -37,6 +37,7 @@ from uavexp.types import Outcome, World
 # [ours]; a flight is worth what its columns weigh
 WEIGHTS = {"success": 10.0, "collision_count": -5.0, "completion_time_s": -0.1, "replans": -0.05}
 _MOST_SEED = 2**31
+_TEXTS = {"outcome", "scene_kind"}  # columns that are no numbers
 
 
 class ReplanEnv(gymnasium.Env[Float32, int]):  # type: ignore[misc]
@@ -75,10 +76,7 @@ class ReplanEnv(gymnasium.Env[Float32, int]):  # type: ignore[misc]
         self._cell, _, self._own = one_trial(overrides, config_dir, values)
         self._metrics = own_metrics(self._cell.metrics)
         self._weights = dict(WEIGHTS if weights is None else weights)
-        columns = {metric.column for metric in (*METRICS, *self._metrics)} - {
-            "outcome",
-            "scene_kind",
-        }  # texts
+        columns = {metric.column for metric in (*METRICS, *self._metrics)} - _TEXTS
         for column in self._weights:
             if column not in columns:
                 raise ConfigError(f"weights: no metric {column}; there are {', '.join(sorted(columns))}")

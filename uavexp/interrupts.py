@@ -33,6 +33,7 @@ class Parser(argparse.ArgumentParser):
 
 def exit_code_of(command: Callable[[], int]) -> int:
     """Run a command; its own exit code, or 1 or 2 for what the user can mend, or 130 when interrupted."""
+    heard = signal.getsignal(signal.SIGTERM)
     try:
         _allow_files()
         return command()
@@ -48,7 +49,8 @@ def exit_code_of(command: Callable[[], int]) -> int:
         sys.stderr.write("interrupted\n")
         return 130
     finally:
-        leave_at_once()  # what was begun has ended
+        if heard is _leave:  # what was begun has ended
+            leave_at_once()
 
 
 def _is_refused(error: BaseException | None) -> bool:

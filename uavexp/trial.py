@@ -85,11 +85,11 @@ class Parts:
 
     def rates_hz(self) -> dict[str, float]:
         """The rates of all roles that have one; goals are chosen at the mission's, if it chooses them."""
-        guided_hz: float | None = getattr(self.mission, "rate_hz", None)
+        chooser = "mission" if hasattr(self.mission, "rate_hz") else "explorer"
         return {
             "sensor.rate_hz": self.sensor.rate_hz,
             "mapping.esdf_rate_hz": self.mapping.esdf_rate_hz,
-            **({"mission.rate_hz": guided_hz} if guided_hz else {"explorer.rate_hz": self.explorer.rate_hz}),
+            f"{chooser}.rate_hz": getattr(self, chooser).rate_hz,
             "controller.rate_hz": self.controller.rate_hz,
         }
 

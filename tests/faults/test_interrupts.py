@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.sweeps import QUICK, begin
+from uavexp.interrupts import exit_code_of, leave_at_once, raise_from_now_on
 
 
 def wait_until_it_hears(process: subprocess.Popen[str]) -> None:
@@ -70,3 +71,20 @@ def test_a_study_does_not_outlive_the_results_that_it_is_flown_for(tmp_path: Pat
     assert (process.returncode, error) == (130, "interrupted\n")
     with pytest.raises(ProcessLookupError):
         os.kill(pid, 0)
+
+
+@pytest.mark.parametrize("as_a_command", [False, True])
+def test_what_hears_signals_after_a_command_is_what_heard_them_before(as_a_command: bool) -> None:
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = {number: signal.getsignal(number) for number in numbers}
+    try:
+        for number in numbers:
+            signal.signal(number, signal.SIG_DFL)
+        if as_a_command:
+            leave_at_once()
+        heard = [signal.getsignal(number) for number in numbers]
+        assert exit_code_of(lambda: raise_from_now_on() or 0) == 0
+        assert [signal.getsignal(number) for number in numbers] == heard
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
