@@ -208,6 +208,8 @@ def test_a_vehicle_that_no_plan_leads_away_has_explored_nothing(
 def test_a_body_that_flies_into_walls_touches_but_never_passes_through() -> None:
     """Single shot at the target through unknown space: contacts happen, overlap does not."""
     trial = uavexp.fly(strategy="ssp", seed=0, world="rooms", stuck_s=3.0)
+    assert trial.metrics["collision_count"] > 0
+    assert trial.metrics["replans"] == 0, "one plan, whatever it leads into"
     scene, size = Scene(trial.world), np.array([0.32, 0.32, 0.12])
     for row in range(0, len(trial.log.steps.time_s), 10):
         rotation = rotation_from_quaternion(trial.log.steps.quaternion_wxyz[row])

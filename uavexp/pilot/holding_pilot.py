@@ -10,7 +10,8 @@ What the safety lets be flown of a plan is asked at every ESDF update (`safety.b
 plan that it refuses has failed, one that it has held for `held_s` is made anew, the second time
 at one place to another goal; so is one at whose end the vehicle stands though its goal is offered yet. A
 vehicle that gets no further so climbs a ladder (`recovery`). What it stands against though nothing
-is mapped there is noted in the map (`touch`).
+is mapped there is noted in the map (`touch`). With `recovers=false` none of this asks for a plan: after the
+first one only the trigger does, and a request that failed is made again.
 """
 
 from __future__ import annotations
@@ -71,8 +72,7 @@ class HoldingPilot(Underway):
         self._select(observation, fresh=False)
         if observation.time_s < self.rules.settle_s - 1e-9:
             return
-        self._miss_goals(observation)
-        rung = self._climbed(observation)
+        rung = self._climbed(observation) if self.rules.recovers else None
         if rung is not None:
             self._recover(rung, observation)
         elif self.flown is None and not self.replans:
@@ -81,6 +81,8 @@ class HoldingPilot(Underway):
             braked = self._wait_for_rest and not self.recovery.lost
             cause = (causes.BRAKE if braked else causes.RETRY).name
             self.request(Decision(replan=True, cause=cause), observation)
+        elif not self.rules.recovers:
+            return
         elif self._waits_s(observation.time_s) >= self.rules.held_s:
             self._ask_anew(observation)
         elif self._idles(observation.time_s):
@@ -193,6 +195,7 @@ class HoldingPilot(Underway):
 
     def _climbed(self, observation: Observation) -> Rung | None:
         """The rung of the ladder whose turn it is; None: go on as before."""
+        self._miss_goals(observation)
         time_s = observation.time_s
         moving, waits_s = self._moving(time_s), self._waits_s(time_s)
         held = waits_s > 0.0 if self.recovery.ladder.climbing else waits_s >= self.rules.held_s
@@ -235,6 +238,8 @@ class HoldingPilot(Underway):
 
     def _stops_behind(self, observation: Observation) -> causes.Cause | None:
         """Why the vehicle stops where it is from now on: it fell behind, or it touches; None: it does not."""
+        if not self.rules.recovers:
+            return None
         error_m, most_m = error_of(observation), self.rules.restart_error_m
         behind = 0.0 < most_m <= error_m
         touches = self.recovery.touches(observation, behind=behind)

@@ -13,6 +13,8 @@ class Rules:
 
     settle_s: NonNegative = 0.5  # s, hovering and mapping before the first plan, or it is made
     # on a single scan [ours]
+    recovers: bool = True  # whether a vehicle that fell behind, touches something or is held gets on by
+    # itself; false: after the first plan only the trigger asks for one [ours]
     restart_error_m: NonNegative = 0.4  # m, tracking error at which the vehicle has fallen behind: it stops,
     # and a plan starts at the measured state instead of the reference; 0: every plan does [ours]
     held_s: NonNegative = 0.6  # s, held by the safety on a plan until another one is asked for [ours]

@@ -228,6 +228,22 @@ def test_a_vehicle_left_behind_stops_its_reference_and_plans_from_where_it_is(
     np.testing.assert_allclose(evaluate(pilot.trajectory, np.array([0.0]))[0][0], held_m, atol=1e-9)
 
 
+def test_told_not_to_recover_it_flies_its_one_plan_on_whatever_holds_it() -> None:
+    """Paper 1's single shot: no plan but the first, and the reference goes to its end."""
+    pilot, field, held_m = make(Ssp()), room(), START + np.array([0.5, 0.1, 0.0])
+    pilot.rules = replace(pilot.rules, recovers=False)
+    fly(pilot, {0.0: field}, 0.1)
+    for step in range(10, 3000):
+        reference = pilot.reference(step * 0.01, 0.01)
+        seen = replace(see(field, step * 0.01, reference), trajectory=pilot.trajectory)
+        seen = replace(seen, state=replace(seen.state, position_m=held_m, velocity_mps=np.zeros(3)))
+        if step % 10 == 0:
+            pilot.decide(seen)
+            pilot.explore(seen)
+    assert [replan.cause for replan in pilot.replans] == ["first"]
+    np.testing.assert_allclose(reference.position_m, TARGET, atol=1e-6)
+
+
 class _Hesitant(TargetOnly):
     """Keeps a goal off the target until a plan asks for the best one."""
 
