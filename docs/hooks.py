@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -132,7 +133,7 @@ def _metric_row(column: str, metric: Metric) -> str:
 def _study_page(folder: Path) -> str:
     """Command, verdicts, tables and figures of a study, in the order in which its report has them."""
     study: dict[str, Any] = json.loads((folder / "study.json").read_text(encoding="utf-8"))
-    lines = [f"# {study['title'] or folder.name}", "", f"`python -m uavexp experiments={study['name']}`", ""]
+    lines = [f"# {study['title'] or folder.name}", "", *_runs(folder), ""]
     claims = [folder / "claims.md"] if (folder / "claims.md").exists() else []
     for file in [*claims, *_in_order(folder / "tables", "*.md", study["report"].get("tables", []))]:
         lines += [re.sub(r"(?m)^### ", "## ", file.read_text(encoding="utf-8")), ""]
@@ -140,6 +141,20 @@ def _study_page(folder: Path) -> str:
         name = figure.stem.replace("_", " ")
         lines += [f"## {name}", "", f"![{name}](figures/{figure.name})", ""]
     return "\n".join(lines)
+
+
+def _runs(folder: Path) -> list[str]:
+    """What was typed, how long it took, where: a line for each command that flew into a folder."""
+    runs = json.loads((folder / "run.json").read_text(encoding="utf-8"))["runs"]
+    typed: dict[str, list[dict[str, Any]]] = {}
+    for run in runs:
+        typed.setdefault(shlex.join(run["command"]), []).append(run)
+    return [
+        f"- `python -m uavexp {words}`: {sum(run['flown'] for run in same)} trials"
+        f" in {sum(run['wall_s'] for run in same) / 60.0:.0f} min, {same[-1]['machine']},"
+        f" commit `{(same[-1]['commit'] or 'unknown')[:7]}`"
+        for words, same in typed.items()
+    ]
 
 
 def _in_order(folder: Path, pattern: str, declared: list[Any]) -> list[Path]:

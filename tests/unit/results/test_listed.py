@@ -26,13 +26,15 @@ def test_every_study_that_is_committed_is_flown_again() -> None:
 def test_every_policy_is_tuned_by_the_same_budget_on_worlds_that_are_not_compared() -> None:
     tuned = [one for one in WHOLE if one.words[0] == TUNE]
     assert len(tuned) >= 6
-    assert {one.trials for one in tuned} == {160}
-    seeds = set(
-        expand_seeds([read_experiment("mcr/policies_tuning", list_experiments()["mcr/policies_tuning"]).seed])
+    assert len({one.trials for one in tuned}) == 1
+    typed = {word.partition("=")[2] for one in tuned for word in one.words if word.startswith("seed=")}
+    tuning = expand_seeds(
+        [read_experiment("mcr/policies_tuning", list_experiments()["mcr/policies_tuning"]).seed]
     )
-    assert not seeds & set(
-        expand_seeds([read_experiment("mcr/policies", list_experiments()["mcr/policies"]).seed])
-    )
+    assert [expand_seeds([text]) for text in typed] == [tuning]
+    assert {one.trials for one in tuned} == {10 * 4 * len(tuning)}, "settings, scenes, seeds"
+    for name in ("mcr/policies", "mcr/policies_new", "mcr/table1", "mcr/second_sample"):
+        assert not set(tuning) & set(expand_seeds([read_experiment(name, list_experiments()[name]).seed]))
 
 
 def test_no_study_is_flown_twice() -> None:
