@@ -24,8 +24,9 @@ from uavexp.tune.space import Tuned, split, wholes_checked
 USAGE = """usage: python -m uavexp tune KEY=LOW:HIGH[:log] [KEY=choice(a,b,c)] [KEY=VALUE ...]
        [objective=success,min_clearance_m,replans] [budget=30] [seed=100:110] [out=DIR] [--config-dir DIR]
 
-Tries settings of the parameters given as a range or a choice, each flown in the same worlds, by Optuna's
-tree-structured Parzen estimator, and prints those that no other beats in every objective.
+Tries settings of the parameters given as a range or a choice, each flown in the same worlds: the present one,
+six spread evenly, then what Optuna's tree-structured Parzen estimator proposes. Prints those that no other
+beats in every objective.
 
   python -m uavexp tune strategy=tbr trigger.interval_s=0.5:5
   python -m uavexp tune strategy=mcr trigger.delta_map_m=0.05:1:log world=warehouse,rooms seed=100:120

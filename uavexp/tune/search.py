@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from scipy.stats import qmc
+
 from uavexp.cli.terminal import Terminal
 from uavexp.config.composition import Cell, CommandLine, Composer
 from uavexp.errors import ConfigError
@@ -22,6 +24,7 @@ from uavexp.tune.objective import front, means, told
 from uavexp.tune.space import Tuned, label_of, settings_of
 
 CANDIDATE = "candidate"  # axis of the settings tried
+_SPREAD = 6  # settings by a sequence of low discrepancy, before Optuna proposes any: few at random leave gaps
 _SEED = 0  # of Optuna's sampler: another would be another search
 
 
@@ -89,7 +92,7 @@ def search(task: Task, composer: Composer, say: Callable[[str], None]) -> list[C
 
 
 def _study(task: Task) -> Any:
-    """Optuna's study; the values that the command has without tuning are tried first."""
+    """Optuna's study: first the values that the command has without tuning, then some spread evenly."""
     try:
         import optuna
     except ImportError as error:
@@ -97,11 +100,15 @@ def _study(task: Task) -> Any:
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     study = optuna.create_study(
         directions=["maximize" if metric.better > 0 else "minimize" for metric in task.metrics],
-        sampler=optuna.samplers.TPESampler(seed=_SEED),
+        sampler=optuna.samplers.TPESampler(seed=_SEED, n_startup_trials=_SPREAD),
     )
     now = {item.key: value_of(task.base, item.key) for item in task.tuned}
     if all(item.holds(now[item.key]) for item in task.tuned):
         study.enqueue_trial({item.key: item.as_drawn(now[item.key]) for item in task.tuned})
+    for shares in qmc.Halton(len(task.tuned), scramble=False).random(_SPREAD).tolist():
+        study.enqueue_trial(
+            {item.key: item.at(share) for item, share in zip(task.tuned, shares, strict=True)}
+        )
     return study
 
 

@@ -46,6 +46,14 @@ class Range:
         """A value as Optuna knows it."""
         return value
 
+    def at(self, share: float) -> Any:
+        """The number at a share of the range, as Optuna knows it."""
+        if self.is_log:
+            number = self.low * (self.high / self.low) ** share
+        else:
+            number = self.low + share * (self.high - self.low)
+        return round(number) if self.is_whole else number
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Choice:
@@ -66,6 +74,10 @@ class Choice:
     def as_drawn(self, value: Any) -> Any:
         """A value as Optuna knows it."""
         return render(value)
+
+    def at(self, share: float) -> Any:
+        """The value at a share of the list, below 1, as Optuna knows it."""
+        return render(self.values[int(share * len(self.values))])
 
 
 Tuned = Range | Choice

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -13,6 +14,7 @@ from uavexp.config.composition import Composer
 from uavexp.errors import ConfigError
 from uavexp.tune.__main__ import task_of
 from uavexp.tune.objective import front, means, objectives
+from uavexp.tune.search import _study
 from uavexp.tune.space import Choice, Range, label_of, split
 
 optuna = pytest.importorskip("optuna", reason="tuning is an extra: pip install 'uavexp[tune]'")
@@ -87,6 +89,19 @@ class TestTask:
         assert task.base.seeds == tuple(range(100, 110))  # none that a comparison uses
         assert task.budget == 3
         assert task.tuned[0].is_whole is False
+
+    def test_the_first_settings_leave_no_gap(self) -> None:
+        words = ["strategy=tbr", "trigger.interval_s=0.5:8:log", "sensor=choice(rgbd,lidar_spinning)"]
+        task = task_of(words, Composer())
+        study, tried = _study(task), []
+        for _ in range(7):
+            trial = study.ask()
+            tried.append([item.suggest(trial) for item in task.tuned])
+            study.tell(trial, [100.0, 0.5, 5.0])
+        assert tried[0] == [5.0, "rgbd"], "the values that are there now"
+        spread = np.log2([interval_s for interval_s, _ in tried])
+        assert np.diff(np.sort(spread)).max() <= 1.0, "of the range's four octaves"
+        assert {sensor for _, sensor in tried[1:]} == {"rgbd", "lidar_spinning"}
 
     @pytest.mark.parametrize(("words", "told"), [
         (["strategy=tbr"], "nothing is tuned"),
