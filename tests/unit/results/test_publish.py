@@ -56,6 +56,14 @@ def test_what_was_there_before_is_gone_and_publishing_again_changes_nothing(
     assert before == {file.name: file.read_bytes() for file in there.rglob("*") if file.is_file()}
 
 
+def test_rows_are_the_same_in_half_the_bytes(flown: Path, tmp_path: Path) -> None:
+    publish(flown, tmp_path / "there")
+    whole, kept = flown / "trials.parquet", tmp_path / "there/trials.parquet"
+    rows = pd.read_parquet(whole)
+    pd.testing.assert_frame_equal(pd.read_parquet(kept)[rows.columns], rows)
+    assert kept.stat().st_size < 0.6 * whole.stat().st_size
+
+
 def test_false_triggers_are_told_without_the_single_replans(flown: Path, tmp_path: Path) -> None:
     publish(flown, tmp_path / "there")
     rows = pd.read_parquet(tmp_path / "there/trials.parquet")
