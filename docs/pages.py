@@ -101,10 +101,14 @@ def number_of(asked: str) -> str:
 
 
 def paired_of(asked: str) -> str:
-    """A paired difference, its interval and corrected p: of `STUDY METRIC FIRST - SECOND`."""
+    """A paired difference, its interval and corrected p: of `STUDY METRIC FIRST - SECOND`.
+
+    Of what needs arrival it is that of the worlds in which both succeeded, as in verdicts.
+    """
     study, column, arms = asked.split(maxsplit=2)
     first, _, second = arms.partition(" - ")
-    label = metrics_of([column])[0].label
+    metric = metrics_of([column])[0]
+    label = f"{metric.label}{BOTH_SUCCEEDED}" if metric.needs_arrival else metric.label
     with (results_of(study) / "tables" / "paired_tests.csv").open(encoding="utf-8", newline="") as text:
         rows = [row for row in csv.DictReader(text) if row["metric"] == label]
     for row in rows:

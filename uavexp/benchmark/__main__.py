@@ -7,10 +7,8 @@ from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
-import pandas as pd
-
 from uavexp.benchmark.entry import SUITE, entry_of
-from uavexp.benchmark.standings import numbers, rows_of, standings
+from uavexp.benchmark.standings import in_common, numbers, rows_of, standings
 from uavexp.cli.arguments import run_or_explain, without_config_dir
 from uavexp.cli.terminal import Terminal
 from uavexp.config.composition import Composer
@@ -21,6 +19,7 @@ from uavexp.errors import ConfigError
 from uavexp.paths import experiments_folder, outputs_root
 from uavexp.report.html import page
 from uavexp.report.html_parts import code, paragraph, table
+from uavexp.report.results import ARM
 from uavexp.report.table_formats import to_markdown
 from uavexp.report.tables.base import Table
 from uavexp.store.folder import folder_of
@@ -36,11 +35,13 @@ replans and compute beside the built-in policies. Writes benchmark.html, and ben
 
 name    of the entry; by default its trigger
 fast=1  a tenth of it
-KEY     any parameter or option: a planner, an explorer, a safety of one's own; it holds in every scene
+KEY     any parameter or option: a planner, an explorer, a safety of one's own; it holds in every scene.
+        Worlds, seeds, movers, mission, vehicle, sensor and its errors are the suite's.
 The same command again goes on where it was.
 """
 PAGE, ROW = "benchmark.html", "benchmark.json"
 _OURS = ("name", "fast", "out")
+_FIXED = ("seed", "experiments", "world", "world_seed", "movers", "mission", "vehicle", "sensor", "estimator")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -56,8 +57,8 @@ def _run(typed: Sequence[str]) -> int:
     given = dict(word.partition("=")[::2] for word in words if word.partition("=")[0] in _OURS)
     own = [word for word in words if word.partition("=")[0] not in _OURS]
     for word in own:
-        if word.partition("=")[0] in ("seed", "experiments", "world", "movers"):
-            raise ConfigError(f"{word}: worlds and seeds are the suite's own; fly others without benchmark")
+        if word.partition("=")[0].partition(".")[0] in _FIXED:
+            raise ConfigError(f"{word}: the suite's own, the same for every entry; fly it without benchmark")
     settings = parse_settings(own)
     trigger = next((str(item.values[0]) for item in settings if item.key in ("trigger", "strategy")), "mine")
     name = given.get("name", trigger) or trigger
@@ -84,7 +85,11 @@ def _put_beside(
     rows = mine
     if (built_in / STUDY).is_file():
         others = rows_of(built_in)
-        rows = pd.concat([mine, others[others["scene"].isin(mine["scene"])]], ignore_index=True)
+        rows = in_common(mine, others)
+        n = len(rows[rows[ARM] == name])
+        terminal.say(f"beside the built-in policies in the {n} of {len(mine)} worlds that all have flown")
+        if not set(others["code"]) <= set(mine["code"]):
+            terminal.say("the built-in policies were flown with other code: make results ONLY=benchmark")
     else:
         terminal.say("the built-in policies are not flown in this checkout: make results ONLY=benchmark")
     tables = standings(rows)

@@ -27,7 +27,7 @@ WHOLE = "whole suite"
 _COMPUTED = ("search", "optimise", "explore", "trigger")  # what a policy's plans cost
 _NOTE = (
     "Compute: clock time of choosing goals, deciding, searching and smoothing, of one flight, on the machine "
-    "that flew it. Built-in policies: the committed rows, of the seeds that stand in their n."
+    "that flew it. Every policy in the worlds that all have flown; the built-in ones: the committed rows."
 )
 
 
@@ -40,6 +40,16 @@ def rows_of(folder: Path) -> pd.DataFrame:
     trials = Results(study=read_study(folder)).trials
     clocks = [name for name in (f"wall_{part}_sum_s" for part in _COMPUTED) if name in trials]
     return trials.assign(**{COMPUTE.column: trials[clocks].astype(float).sum(axis=1)})
+
+
+def in_common(mine: pd.DataFrame, others: pd.DataFrame) -> pd.DataFrame:
+    """Trials of an entry and of the built-in policies in the worlds that both have flown."""
+    worlds = [pd.MultiIndex.from_frame(rows[[SCENE, "seed"]]) for rows in (mine, others)]
+    kept = [
+        rows[own.isin(worlds[1 - n])]
+        for n, (rows, own) in enumerate(zip((mine, others), worlds, strict=True))
+    ]
+    return pd.concat(kept, ignore_index=True)
 
 
 def parts_of(rows: pd.DataFrame) -> dict[str, pd.DataFrame]:

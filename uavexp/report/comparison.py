@@ -249,6 +249,11 @@ def compare(
     difference = one - two
     if not difference.size:
         return _NO_PAIRS
+    p_pairs = (
+        significance.mcnemar_p(one > 0.0, two > 0.0)
+        if metric.is_rate
+        else significance.wilcoxon_p(difference)
+    )
     if pairs.scenes_are_units and np.unique(cluster).size < 2:  # nothing of one scene speaks of others
         return replace(
             _NO_PAIRS,
@@ -257,6 +262,7 @@ def compare(
             first_mean=float(one.mean()),
             second_mean=float(two.mean()),
             mean=float(difference.mean()),
+            p_pairs=p_pairs,
         )
     return Difference(
         pairs=difference.size,
@@ -266,9 +272,7 @@ def compare(
         mean=float(difference.mean()),
         interval=_difference_interval(pairs, metric, exist),
         p=significance.sign_flip_p(difference + margin, cluster, alternative),
-        p_pairs=significance.mcnemar_p(one > 0.0, two > 0.0)
-        if metric.is_rate
-        else significance.wilcoxon_p(difference),
+        p_pairs=p_pairs,
         effect=float(difference.mean()) if metric.is_rate else significance.rank_biserial(difference),
     )
 

@@ -135,6 +135,9 @@ def no_worse_in_any_scene(results: Results, *, arms: Sequence[str], metric: Metr
     own = [gain[pairs.scene == number] for number in range(len(scenes))]
     if not all(np.isfinite(some).any() for some in own):
         return Verdict.NOT_TESTABLE, "a scene without a world that both arms have flown"
+    fewest = min(int(np.isfinite(some).sum()) for some in own)
+    if len(scenes) * smallest_p(fewest, "less") > ALPHA:
+        return Verdict.NOT_TESTABLE, f"{fewest} worlds in a scene: nothing in it could be shown to be worse"
     worse = [name for name, some in zip(scenes, own, strict=True) if np.nansum(some) < 0.0]
     p = holm(np.array([sign_flip_p(some, np.arange(some.size), "less") for some in own]))
     shown = np.nanmin(p, initial=1.0) < ALPHA
@@ -230,6 +233,10 @@ class _Rival:
         """All three must hold: the largest of their p values (Berger 1982, intersection-union test)."""
         return float(np.max([self.success.p, self.clearance.p, self.replans.p]))  # NaN when one is
 
+    def p_within(self, success_percent: float) -> float:
+        """The same; 1 where so few flights leave open that success is less by the margin."""
+        return self.p if self.success.interval.low > -success_percent else max(self.p, 1.0)
+
     def loses(self, success_percent: float, clearance_m: float) -> bool:
         """Whether an interval rules one of the three out."""
         success, clearance, replans = (_ends(one) for one in (self.success, self.clearance, self.replans))
@@ -252,7 +259,7 @@ def trade_off(
     paired = [rival for rival in rivals if math.isfinite(rival.p)]
     if not paired:
         return Verdict.NOT_TESTABLE, "no common worlds"
-    corrected = holm(np.array([rival.p for rival in paired]))
+    corrected = holm(np.array([rival.p_within(success_percent) for rival in paired]))
     best = int(np.argmin(corrected))
     rival, p = paired[best], float(corrected[best])
     lost = all(one.loses(success_percent, clearance_m) for one in paired)
@@ -263,8 +270,9 @@ def trade_off(
         f"nearest: {rival.arm}, success {number_format.difference(rival.success, RATE)} points, "
         f"clearance {number_format.difference(rival.clearance, CLEARANCE)} m, "
         f"replans {number_format.difference(rival.replans, REPLANS)}; p = {number_format.p_value(p)} (sign "
-        f"flips of scenes for all three, success less by under {success_percent:g} points and "
-        f"clearance by under {clearance_m:g} m allowed, Holm over {len(paired)} arms); contradicted when an "
+        f"flips of scenes for all three, success less by under {success_percent:g} points, in its whole "
+        f"interval, and clearance by under {clearance_m:g} m allowed, Holm over {len(paired)} arms); "
+        "contradicted when an "
         "interval rules one of the three out for every arm"
     )
 

@@ -12,15 +12,18 @@ import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from pyarrow import parquet as pq
+
 from uavexp.errors import ConfigError
 from uavexp.interrupts import exit_code_of, raise_from_now_on
 from uavexp.paths import checkout_root, outputs_root
 from uavexp.report.significance import ALPHA
 from uavexp.results.changes import Change, changes, verdict_changes
-from uavexp.results.listed import TENTH, Listed, committed, listed
+from uavexp.results.listed import TENTH, TUNE, Listed, committed, listed
 from uavexp.results.publish import publish
 from uavexp.store.records import code_digest, write_text
-from uavexp.store.study import STUDY
+from uavexp.store.study import RUN, STUDY
+from uavexp.store.table import TABLE
 
 USAGE = """usage: python -m uavexp.results [FAST=1] [DRY=1] [ONLY=WORD]     (make results FAST=1)
 
@@ -33,6 +36,7 @@ ONLY=WORD  the studies whose name holds the word
 The same command again goes on where it was; other code begins anew, in a folder of its own.
 """
 _CHANGES = "changes.md"
+_NOTES = "changes"  # folder of its parts, one for each study
 _GRACE_S = 2.0
 _SHOWN = 12  # changes of a study at the terminal; the file has all
 
@@ -61,7 +65,11 @@ def _run(typed: Sequence[str]) -> int:
         return 0
     folder = outputs_root() / "results" / f"{code_digest()[:8]}{'-fast' if is_fast else ''}"
     unfinished = [one.study for one in plan if not _fly(one, folder / one.study)]
-    write_text(folder / _CHANGES, "\n".join(_changed(plan, folder)) + "\n")
+    for one in plan:
+        if not _is_published(one, folder):
+            told = "\n".join(_changed(one, folder, whole=one.study not in unfinished))
+            write_text(folder / _NOTES / f"{one.study.replace('/', '_')}.md", told)
+    write_text(folder / _CHANGES, "\n".join(file.read_text() for file in sorted((folder / _NOTES).iterdir())))
     if not is_fast:
         for one in plan:
             if one.study not in unfinished:
@@ -97,7 +105,16 @@ def _fly(one: Listed, folder: Path) -> bool:
     if ended < 0 or ended == 130:
         raise KeyboardInterrupt
     _say(f"{one.study}: {_clock(time.monotonic() - began_s)}, said to take {_clock(one.estimate_s)}")
-    return ended == 0
+    return ended == 0 and _is_whole(one, folder)
+
+
+def _is_whole(one: Listed, folder: Path) -> bool:
+    """Whether a folder holds the trials of its line, and none of what the line was before."""
+    there = pq.read_metadata(folder / TABLE).num_rows
+    fewer = one.words[0] == TUNE and there < one.trials  # a setting that was tried twice is flown once
+    if there != one.trials and not fewer:
+        _say(f"{folder} holds {there} trials, the line flies {one.trials}; remove the folder and fly it anew")
+    return there == one.trials or fewer
 
 
 def _ended(command: Sequence[str]) -> int:
@@ -113,20 +130,25 @@ def _ended(command: Sequence[str]) -> int:
             raise
 
 
-def _changed(plan: Sequence[Listed], folder: Path) -> Iterator[str]:
-    """What is otherwise than what is committed, study by study."""
-    for one in plan:
-        if not ((folder / one.study / STUDY).is_file() and (committed(one.study) / STUDY).is_file()):
-            yield f"## {one.study}\n\nNothing to compare.\n"
-            continue
-        found = changes(committed(one.study), folder / one.study)
-        beyond = sorted((change for change in found if change.p < ALPHA), key=lambda change: change.p)
-        verdicts = verdict_changes(committed(one.study), folder / one.study)
-        _say(_summary(one.study, found, beyond, verdicts))
-        yield f"## {one.study}\n"
-        yield from (f"- verdict: {line}" for line in verdicts)
-        yield from (f"- {change}" for change in beyond)
-        yield f"\n{len(beyond)} of {len(found)} means beyond chance (Holm over the study, p < {ALPHA:g}).\n"
+def _is_published(one: Listed, folder: Path) -> bool:
+    """Whether what is committed of a study is what was flown here: what changed by it is told already."""
+    files = [place / RUN for place in (folder / one.study, committed(one.study))]
+    return all(file.is_file() for file in files) and files[0].read_bytes() == files[1].read_bytes()
+
+
+def _changed(one: Listed, folder: Path, *, whole: bool) -> Iterator[str]:
+    """What is otherwise than what is committed of a study."""
+    yield f"## {one.study}{'' if whole else ', not flown to its end'}\n"
+    if not ((folder / one.study / STUDY).is_file() and (committed(one.study) / STUDY).is_file()):
+        yield "Nothing to compare.\n"
+        return
+    found = changes(committed(one.study), folder / one.study)
+    beyond = sorted((change for change in found if change.p < ALPHA), key=lambda change: change.p)
+    verdicts = verdict_changes(committed(one.study), folder / one.study)
+    _say(_summary(one.study, found, beyond, verdicts))
+    yield from (f"- verdict: {line}" for line in verdicts)
+    yield from (f"- {change}" for change in beyond)
+    yield f"\n{len(beyond)} of {len(found)} means beyond chance (Holm over the study, p < {ALPHA:g}).\n"
 
 
 def _summary(study: str, found: Sequence[Change], beyond: Sequence[Change], verdicts: Sequence[str]) -> str:

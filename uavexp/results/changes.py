@@ -30,7 +30,7 @@ class Change:
 
     arm: str
     metric: Metric
-    before: float
+    before: float  # of the pairs; unpaired, of all flights
     now: float
     pairs: int  # of the same scene and seed; 0: compared unpaired
     p: float  # of the flights (McNemar, Wilcoxon; unpaired: Mann and Whitney), Holm over the study
@@ -42,14 +42,13 @@ class Change:
 
 
 def changes(committed: Path, flown: Path) -> list[Change]:
-    """Every arm that both hold, in every metric that the committed tables show and both hold.
+    """Every arm and every metric of the committed tables that both hold, where it can be tested.
 
     Raises:
         RecordError: one of the folders holds no study, or a damaged one.
     """
-    found = list(
-        _changes(Results(study=read_study(committed)), Results(study=read_study(flown)), _shown(committed))
-    )
+    both = Results(study=read_study(committed)), Results(study=read_study(flown))
+    found = [change for change in _changes(*both, _shown(committed)) if math.isfinite(change.p)]
     corrected = holm(np.array([change.p for change in found]))
     return [replace(change, p=float(p)) for change, p in zip(found, corrected, strict=True)]
 
@@ -76,14 +75,10 @@ def _change(before: pd.DataFrame, now: pd.DataFrame, arm: str, metric: Metric) -
     panel = panel_of(pd.concat(both, ignore_index=True), ARM, ("a", "b"))
     found = compare(pairs_of(panel, "a", "b", [metric]), metric)
     one, two = (_there(panel.values(metric, name)) for name in "ab")
-    return Change(
-        arm=arm,
-        metric=metric,
-        before=float(one.mean()) if one.size else math.nan,
-        now=float(two.mean()) if two.size else math.nan,
-        pairs=found.pairs,
-        p=found.p_pairs if found.pairs else _unpaired_p(one, two),
-    )
+    unpaired = [float(some.mean()) if some.size else math.nan for some in (one, two)]
+    before, after = (found.first_mean, found.second_mean) if found.pairs else unpaired
+    p = found.p_pairs if found.pairs else _unpaired_p(one, two)
+    return Change(arm=arm, metric=metric, before=before, now=after, pairs=found.pairs, p=p)
 
 
 def _there(values: Float) -> Float:

@@ -45,7 +45,7 @@ _MOST = 10_000  # settings
 def main(arguments: Sequence[str] | None = None) -> int:
     """Tune by a command line and return the exit code.
 
-    0; 1 the disk was full; 2 bad input; 130 interrupted.
+    0; 1 a trial did not run to its end, or the disk was full; 2 bad input; 130 interrupted.
     """
     return run_or_explain(arguments, USAGE, _tune)
 
@@ -61,7 +61,7 @@ def _tune(typed: Sequence[str]) -> int:
 
     page = make_report(folder)[-1]
     sys.stdout.write("\n".join([*summary(task, candidates), f"report:  {page}", str(folder)]) + "\n")
-    return 0
+    return int(not all(one.whole for one in candidates))
 
 
 def task_of(words: Sequence[str], composer: Composer, typed: Sequence[str] = ()) -> Task:

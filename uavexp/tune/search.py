@@ -45,6 +45,7 @@ class Candidate:
 
     label: str
     means: tuple[float, ...] | None  # of the objectives; None: not one flight has them
+    whole: bool  # whether every flight ran to its end
 
 
 class _Listener(Terminal):
@@ -81,9 +82,9 @@ def search(task: Task, composer: Composer, say: Callable[[str], None]) -> list[C
             new = list(_cells(task.base, composer, label, values))
             cells += new
             listener = _Listener()
-            execute(_command(task, cells, new), listener, composer.user_folder, task.typed)
+            failed = execute(_command(task, cells, new), listener, composer.user_folder, task.typed)
             rows = [row for row in listener.rows if row[CANDIDATE] == label]
-            flown[label] = Candidate(label=label, means=means(task.metrics, rows))
+            flown[label] = Candidate(label=label, means=means(task.metrics, rows), whole=not failed)
         found = flown[label].means
         study.tell(trial, found, state=None if found else _ended()[1])
         what = told(task.metrics, found) if found else "no flight ran to its end"

@@ -11,7 +11,7 @@ import pytest
 
 from uavexp.benchmark.__main__ import main
 from uavexp.benchmark.entry import SUITE, entry_of, part_of
-from uavexp.benchmark.standings import WHOLE, numbers, standings
+from uavexp.benchmark.standings import WHOLE, in_common, numbers, standings
 from uavexp.config.composition import Composer
 from uavexp.config.experiment import read_experiment
 from uavexp.config.overrides import parse_settings
@@ -78,7 +78,8 @@ def test_fast_is_a_tenth_of_the_seeds(mine) -> None:
 def test_what_cannot_be_an_entry_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     for words, told in (
         (["trigger=mcr", "name=MCR"], "a built-in policy is called so"),
-        (["trigger=mcr", "seed=0"], "worlds and seeds are the suite's own"),
+        (["trigger=mcr", "seed=0"], "the suite's own, the same for every entry"),
+        (["trigger=mcr", "world.density_per_m2=0.01"], "the suite's own, the same for every entry"),
         (["trigger=tbr", "trigger.interval_s=1,2"], "an entry is one policy"),
         (["--fast", "trigger=mcr"], "no such flag: --fast"),
     ):
@@ -95,6 +96,14 @@ def rows() -> pd.DataFrame:
         success=made["scene"] != "BARN: 6", collision_count=0, spl=0.5, completion_time_s=10.0 * slower,
         replans=7, compute_s=slower,
     )  # fmt: skip
+
+
+def test_all_stand_beside_each_other_in_the_same_worlds() -> None:
+    made = rows()
+    mine, others = made[made["arm of all axes"] == "mine"], made[made["arm of all axes"] == "MCR"]
+    there = in_common(mine, others[others["seed"] == 1000])
+    assert set(there["seed"]) == {1000}
+    assert there.groupby("arm of all axes").size().to_dict() == {"mine": 3, "MCR": 3}
 
 
 def test_standings_are_the_means_of_the_whole_and_of_each_part() -> None:

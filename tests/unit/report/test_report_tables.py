@@ -201,7 +201,6 @@ def test_claims_that_hold_are_reproduced_and_others_are_not(trials: pd.DataFrame
         "TBR has a higher success rate than SSP",
         "MCR has fewer replans than TBR",
         "MCR has a shorter path than TBR",
-        "The trends are the same in every scene: MCR succeeds no less often than TBR",
     ):
         assert verdict_of(claims, words) is Verdict.REPRODUCED, words
     assert verdict_of(claims, "MCR has a higher success rate than TBR frequent") is Verdict.NOT_SHOWN
@@ -285,7 +284,9 @@ def test_a_worsening_is_ruled_out_or_shown_or_neither(trials: pd.DataFrame) -> N
 
 def test_worse_in_a_scene_by_chance_contradicts_nothing(trials: pd.DataFrame) -> None:
     words = "The trends are the same in every scene: MCR succeeds no less often than TBR"
-    one = trials.copy()
+    assert verdict_of(report_of(trials).judgements, words) is Verdict.NOT_TESTABLE  # six worlds a scene
+    one = trials_of({"TBR": BAD, "MCR": GOOD}, seeds=12)
+    assert verdict_of(report_of(one).judgements, words) is Verdict.REPRODUCED
     there = (one["scene"] == one["scene"].iloc[0]) & one["arm"].isin(["MCR", "TBR"])
     first = one["seed"] == one["seed"].min()
     one.loc[there, "success"] = True

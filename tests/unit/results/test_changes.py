@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,13 @@ def altered(folder: Path, **columns: object) -> Path:
     return folder
 
 
+def part_of(folder: Path, rows: Callable[[pd.DataFrame], pd.Series]) -> Path:
+    """The study in which only some of the flights were flown."""
+    trials = pd.read_parquet(folder / "trials.parquet")
+    trials[rows(trials)].to_parquet(folder / "trials.parquet")
+    return folder
+
+
 def test_the_same_flights_changed_nothing(tmp_path: Path) -> None:
     found = changes(COMMITTED, altered(tmp_path / "now"))
     assert len(found) > 50
@@ -39,6 +47,23 @@ def test_a_change_is_found_where_it_is_with_its_size(tmp_path: Path) -> None:
     assert {(change.arm, change.metric.column) for change in beyond} == {(ARM, "path_length_m")}
     assert beyond[0].now - beyond[0].before == pytest.approx(3.0)
     assert beyond[0].pairs == 200
+
+
+def test_of_a_part_the_means_are_those_of_the_pairs(tmp_path: Path) -> None:
+    now = altered(tmp_path / "now", min_clearance_m=lambda values: values - 0.01)
+    part_of(now, lambda trials: trials["seed"] < 2)
+    found = [one for one in changes(COMMITTED, now) if one.metric.column == "min_clearance_m"]
+    assert {one.arm: round(one.now - one.before, 6) for one in found} == {
+        one.arm: -0.01 if one.arm == ARM else 0.0 for one in found
+    }
+    assert {one.pairs for one in found} == {20}
+
+
+def test_what_a_single_scene_lost_is_seen(tmp_path: Path) -> None:
+    now = altered(tmp_path / "now", collision_count=lambda values: values + 50)
+    part_of(now, lambda trials: trials["scene"] == "rooms")
+    beyond = {one.metric.column for one in changes(COMMITTED, now) if one.p < 0.05}
+    assert beyond == {"collision_count"}
 
 
 def test_other_seeds_are_compared_unpaired(tmp_path: Path) -> None:
