@@ -23,11 +23,13 @@ from uavexp.report.comparison import (
     interval_of,
     pairs_of,
 )
-from uavexp.report.labels import CLEARANCE, RATE, REPLANS
+from uavexp.report.labels import CLEARANCE, RATE, REPLANS, metrics_of
 from uavexp.report.paired import PairedTest, paired_tests
 from uavexp.report.results import Results
 from uavexp.report.significance import ALPHA, holm, sign_flip_p, smallest_p
 from uavexp.report.statistics import Interval
+
+(_TIME,) = metrics_of(("completion_time_s",))
 
 RULE = (
     "A claimed direction is reproduced when the difference has that sign and its p value (sign flips of "
@@ -112,17 +114,32 @@ def no_worse(results: Results, *, arms: Sequence[str], metric: Metric, margin: f
     """The first arm is worse than the second by less than a margin (in the unit shown)."""
     first, second = arms
     found = compare(pairs_of(results.panel, first, second, [metric]), metric)
-    worse = Interval(*sorted(-metric.better * end for end in _ends(found)))
+    ends = _ends(found, _rare(results, first, metric))
+    worse = Interval(*sorted(-metric.better * end for end in ends))
     return _within(Interval(-math.inf, margin), worse), (
         f"{metric.label} against {second}: {number_format.difference(found, metric)}, {found.pairs} pairs; "
         f"reproduced when the interval rules out a worsening by {margin:g}, contradicted when it shows one"
     )
 
 
-def _ends(found: Difference) -> Interval:
-    """Interval of a difference; where it is the same in every pair, as when nothing happened, itself."""
-    alike = math.isnan(found.interval.low) and found.units >= FEWEST_SCENES
-    return Interval(found.mean, found.mean) if alike else found.interval
+def _rare(results: Results, arm: str, metric: Metric) -> float:
+    """What a mean may yet be off by where all flights are alike: of events that are too rare to occur.
+
+    Infinite for what is neither a count nor events in a time: nothing bounds a single value of it.
+    """
+    exposure = float(results.panel.n(arm))
+    if metric.unit == "1/min":
+        exposure = float(np.nansum(results.panel.values(_TIME, arm))) / 60.0
+    elif not metric.is_count:
+        return math.inf
+    return statistics.no_event_interval(1).high / exposure if exposure else math.inf
+
+
+def _ends(found: Difference, rare: float = 0.0) -> Interval:
+    """Interval of a difference; `rare` about it where it is the same in every pair."""
+    if math.isnan(found.interval.low) and found.units >= FEWEST_SCENES:
+        return Interval(found.mean - rare, found.mean + rare)
+    return found.interval
 
 
 def no_worse_in_any_scene(results: Results, *, arms: Sequence[str], metric: Metric) -> Ruling:

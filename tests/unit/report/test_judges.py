@@ -12,7 +12,7 @@ import pytest
 from uavexp.report import judges
 from uavexp.report.comparison import panel_of
 from uavexp.report.judges import Verdict
-from uavexp.report.labels import CLEARANCE, RATE
+from uavexp.report.labels import CLEARANCE, RATE, REPLANS
 
 ARMS = ("A", "B")
 
@@ -50,3 +50,11 @@ def test_no_scene_is_worse_where_all_are_known_only() -> None:
     assert judges.no_worse_in_any_scene(unknown, arms=ARMS, metric=CLEARANCE)[0] is Verdict.NOT_TESTABLE
     few = results(seeds=7)  # 8 / 2**7 > 0.05: in no scene could they show that it is worse
     assert judges.no_worse_in_any_scene(few, arms=ARMS, metric=CLEARANCE)[0] is Verdict.NOT_TESTABLE
+
+
+def test_what_did_not_happen_in_few_flights_may_yet_happen() -> None:
+    """Of a count the Poisson bound is left, 3.7 in all flights; nothing bounds another value."""
+    few = results(seeds=1)  # eight flights
+    assert judges.no_worse(few, arms=ARMS, metric=REPLANS, margin=0.4)[0] is Verdict.NOT_SHOWN
+    assert judges.no_worse(few, arms=ARMS, metric=REPLANS, margin=0.5)[0] is Verdict.REPRODUCED
+    assert judges.no_worse(results(), arms=ARMS, metric=CLEARANCE, margin=9.0)[0] is Verdict.NOT_SHOWN
