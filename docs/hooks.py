@@ -147,7 +147,7 @@ def _runs(folder: Path) -> list[str]:
     """What was typed, how long it took, where: a line for each command that flew into a folder."""
     runs = json.loads((folder / "run.json").read_text(encoding="utf-8"))["runs"]
     typed: dict[str, list[dict[str, Any]]] = {}
-    for run in runs:
+    for run in [run for run in runs if run["flown"]] or runs:
         typed.setdefault(shlex.join(run["command"]), []).append(run)
     return [
         f"- `python -m uavexp {words}`: {sum(run['flown'] for run in same)} trials"
