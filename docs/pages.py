@@ -36,6 +36,7 @@ from uavexp.report.labels import RATE, metrics_of
 from uavexp.report.number_format import NONE, mean_with_interval, number
 from uavexp.report.printed import read_reference
 from uavexp.report.statistics import Interval
+from uavexp.report.tables.paired_tests import BOTH_SUCCEEDED
 
 ROOT = Path(__file__).parents[1]
 _END = "<!-- end -->"

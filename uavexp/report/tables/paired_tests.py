@@ -12,6 +12,7 @@ from uavexp.report.paired import PairedTest
 from uavexp.report.results import Results
 from uavexp.report.tables.base import Table
 
+BOTH_SUCCEEDED = ", both succeeded"  # behind a metric's label
 _COLUMNS = (
     "metric",
     "first",
@@ -48,7 +49,7 @@ def table(results: Results, *, name: str, metrics: Sequence[Metric]) -> Table | 
 def _row(test: PairedTest) -> tuple[str, ...]:
     found, digits = test.found, test.metric.digits
     return (
-        test.metric.label + (", both succeeded" if test.both_succeeded else ""),
+        test.metric.label + (BOTH_SUCCEEDED if test.both_succeeded else ""),
         test.first,
         test.second,
         str(found.pairs),
