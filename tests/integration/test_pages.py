@@ -31,6 +31,11 @@ def test_no_table_and_no_number_of_a_page_is_stale(
     assert pages.main(["--check"]) == 0, capsys.readouterr().out
 
 
+def test_no_number_begins_a_line_as_a_comment_there_ends_a_paragraph(pages: ModuleType) -> None:
+    for page in pages.pages():
+        assert not re.findall(r"(?m)^\s*<!-- (?:number|paired): .*", page.read_text(encoding="utf-8")), page
+
+
 def replans_of(arm: str) -> str:
     with (ROOT / "experiments/mcr/results/table1/tables/values.csv").open(encoding="utf-8") as text:
         means = {(row["metric"], row["arm"]): float(row["mean"]) for row in csv.DictReader(text)}
