@@ -44,12 +44,8 @@ def rows_of(folder: Path) -> pd.DataFrame:
 
 def in_common(mine: pd.DataFrame, others: pd.DataFrame) -> pd.DataFrame:
     """Trials of an entry and of the built-in policies in the worlds that both have flown."""
-    worlds = [pd.MultiIndex.from_frame(rows[[SCENE, "seed"]]) for rows in (mine, others)]
-    kept = [
-        rows[own.isin(worlds[1 - n])]
-        for n, (rows, own) in enumerate(zip((mine, others), worlds, strict=True))
-    ]
-    return pd.concat(kept, ignore_index=True)
+    mine_in, others_in = (pd.MultiIndex.from_frame(rows[[SCENE, "seed"]]) for rows in (mine, others))
+    return pd.concat([mine[mine_in.isin(others_in)], others[others_in.isin(mine_in)]], ignore_index=True)
 
 
 def parts_of(rows: pd.DataFrame) -> dict[str, pd.DataFrame]:

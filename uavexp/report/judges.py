@@ -252,7 +252,7 @@ class _Rival:
 
     def p_within(self, success_percent: float) -> float:
         """The same; 1 where so few flights leave open that success is less by the margin."""
-        return self.p if self.success.interval.low > -success_percent else max(self.p, 1.0)
+        return self.p if self.success.interval.low > -success_percent else 1.0
 
     def loses(self, success_percent: float, clearance_m: float) -> bool:
         """Whether an interval rules one of the three out."""

@@ -18,11 +18,11 @@ from uavexp.errors import ConfigError
 from uavexp.interrupts import exit_code_of, raise_from_now_on
 from uavexp.paths import checkout_root, outputs_root
 from uavexp.report.significance import ALPHA
-from uavexp.results.changes import Change, changes, verdict_changes
+from uavexp.results.changes import Change, changes, is_the_same, verdict_changes
 from uavexp.results.listed import TENTH, TUNE, Listed, committed, listed
 from uavexp.results.publish import publish
 from uavexp.store.records import code_digest, write_text
-from uavexp.store.study import RUN, STUDY
+from uavexp.store.study import STUDY
 from uavexp.store.table import TABLE
 
 USAGE = """usage: python -m uavexp.results [FAST=1] [DRY=1] [ONLY=WORD]     (make results FAST=1)
@@ -65,11 +65,7 @@ def _run(typed: Sequence[str]) -> int:
         return 0
     folder = outputs_root() / "results" / f"{code_digest()[:8]}{'-fast' if is_fast else ''}"
     unfinished = [one.study for one in plan if not _fly(one, folder / one.study)]
-    for one in plan:
-        if not _is_published(one, folder):
-            told = "\n".join(_changed(one, folder, whole=one.study not in unfinished))
-            write_text(folder / _NOTES / f"{one.study.replace('/', '_')}.md", told)
-    write_text(folder / _CHANGES, "\n".join(file.read_text() for file in sorted((folder / _NOTES).iterdir())))
+    _note_changes(plan, folder, unfinished)
     if not is_fast:
         for one in plan:
             if one.study not in unfinished:
@@ -130,10 +126,16 @@ def _ended(command: Sequence[str]) -> int:
             raise
 
 
-def _is_published(one: Listed, folder: Path) -> bool:
-    """Whether what is committed of a study is what was flown here: what changed by it is told already."""
-    files = [place / RUN for place in (folder / one.study, committed(one.study))]
-    return all(file.is_file() for file in files) and files[0].read_bytes() == files[1].read_bytes()
+def _note_changes(plan: Sequence[Listed], folder: Path, unfinished: Sequence[str]) -> None:
+    """Write what changed; of a study that is in place already it stays as it was told."""
+    notes = folder / _NOTES
+    notes.mkdir(parents=True, exist_ok=True)
+    for one in plan:
+        if not is_the_same(committed(one.study), folder / one.study):
+            told = "\n".join(_changed(one, folder, whole=one.study not in unfinished))
+            write_text(notes / f"{one.study.replace('/', '_')}.md", told)
+    parts = [file.read_text(encoding="utf-8") for file in sorted(notes.iterdir())]
+    write_text(folder / _CHANGES, "\n".join(parts))
 
 
 def _changed(one: Listed, folder: Path, *, whole: bool) -> Iterator[str]:

@@ -20,6 +20,7 @@ from uavexp.report.labels import metrics_of
 from uavexp.report.results import ARM, Results
 from uavexp.report.significance import holm
 from uavexp.store.study import read_study
+from uavexp.store.table import TABLE
 
 CLAIMS = "claims.csv"
 
@@ -88,6 +89,17 @@ def _there(values: Float) -> Float:
 def _unpaired_p(one: Float, two: Float) -> float:
     """Mann and Whitney's test, two-sided; NaN where there is nothing to compare."""
     return float(stats.mannwhitneyu(one, two).pvalue) if one.size and two.size else math.nan
+
+
+def is_the_same(committed: Path, flown: Path) -> bool:
+    """Whether two folders hold the same trials of the same code; not when one of them is not there."""
+    files = [place / TABLE for place in (committed, flown)]
+    if not all(file.is_file() for file in files):
+        return False
+    one, two = (
+        set(pd.read_parquet(file, columns=["trial", "code"]).itertuples(index=False)) for file in files
+    )
+    return one == two
 
 
 def verdict_changes(committed: Path, flown: Path) -> list[str]:

@@ -20,6 +20,7 @@ from uavexp.errors import ConfigError
 from uavexp.paths import experiments_folder
 from uavexp.report.comparison import SCENE
 from uavexp.store.table import TABLE
+from uavexp.tune.space import split
 
 LIST = "results.yaml"
 TENTH = 0.1
@@ -67,8 +68,7 @@ def _listed(line: Sequence[str], share: float) -> Listed:
         raise ConfigError(f"{LIST}: {' '.join(line)}: experiments= must name one of {', '.join(files)}")
     experiment = read_experiment(name, files[name])
     own = [word for word in line if word.partition("=")[0] not in ("experiments", _BUDGET, TUNE)]
-    ranges = [word for word in own if is_tuned and ":" in word and not word.startswith("seed=")]
-    typed = parse_settings([word for word in own if word not in ranges])
+    typed = parse_settings(split(own)[1] if is_tuned else own)
     asked = [item.values for item in typed if item.key == "seed"]
     seeds = expand_seeds(asked[0] if asked else [experiment.seed])
     budget = int(given[_BUDGET].partition("=")[2]) if is_tuned else 1

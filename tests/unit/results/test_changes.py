@@ -11,7 +11,10 @@ import pandas as pd
 import pytest
 
 from uavexp.paths import experiments_folder
+from uavexp.results import __main__ as command
 from uavexp.results.changes import changes, verdict_changes
+from uavexp.results.listed import listed
+from uavexp.store.records import code_digest
 
 COMMITTED = experiments_folder() / "mcr" / "results" / "table1"
 ARM, OTHER = "TBR", "MCR"
@@ -80,3 +83,23 @@ def test_another_verdict_is_told(tmp_path: Path) -> None:
     (now / "claims.csv").write_text(text.replace(",reproduced,", ",contradicted,", 1))
     (line,) = verdict_changes(COMMITTED, now)
     assert line.endswith("reproduced -> contradicted")
+
+
+def test_what_changed_is_told_once_and_stays_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The second run finds the study in place; it would compare it with itself."""
+    flown = tmp_path / "outputs" / "results" / code_digest()[:8] / "mcr" / "table1"
+    there = tmp_path / "there"
+    shutil.copytree(COMMITTED, there)
+    one = next(one for one in listed() if one.study == "mcr/table1")
+    monkeypatch.setattr(command, "listed", lambda share: [one])
+    monkeypatch.setattr(command, "committed", lambda study: there)
+    monkeypatch.setattr(command, "outputs_root", lambda: tmp_path / "outputs")
+    monkeypatch.setattr(command, "_fly", lambda study, folder: folder.is_dir())
+    monkeypatch.setattr(command.subprocess, "run", lambda *words, **how: None)
+    altered(flown, path_length_m=lambda values: values + 3.0, code=lambda values: "another")
+    assert command.main([]) == 0
+    told = (flown.parents[1] / "changes.md").read_text()
+    assert "## mcr/table1" in told
+    assert "TBR: Path length" in told
+    assert command.main([]) == 0
+    assert (flown.parents[1] / "changes.md").read_text() == told
