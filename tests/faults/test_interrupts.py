@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.sweeps import QUICK, begin
+from tests.sweeps import QUICK, begin, variables
 from uavexp.interrupts import exit_code_of, leave_at_once, raise_from_now_on
 
 
@@ -51,6 +51,18 @@ def test_other_commands_that_still_load_end_in_one_line(command: str, delay_s: f
     _, error = process.communicate(timeout=120)
     if was_running and not error.startswith("error: "):  # it had said all, and was ending
         assert (process.returncode, error) == (130, "interrupted\n")
+
+
+def test_an_interrupt_that_came_through_exec_is_an_exit_code(tmp_path: Path) -> None:
+    """CPython remembers it and ends a `-m` process by the signal, caught or not (Modules/main.c)."""
+    (tmp_path / "late.py").write_text(
+        "import sys; import uavexp.sweep.run as sweep; from uavexp.__main__ import main\n"
+        "sweep._world_checks = lambda agenda: exec('raise KeyboardInterrupt')\n"
+        f"sys.exit(main([*{QUICK!r}, 'seed=0:2', 'out={tmp_path / 'out'}']))\n"
+    )
+    command = [sys.executable, "-m", "late"]
+    late = subprocess.run(command, cwd=tmp_path, env=variables(), capture_output=True, text=True)
+    assert (late.returncode, late.stderr) == (130, "interrupted\n")
 
 
 def test_a_study_does_not_outlive_the_results_that_it_is_flown_for(tmp_path: Path) -> None:

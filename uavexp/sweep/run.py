@@ -72,7 +72,11 @@ def execute(
         if agenda.left:
             _prepare(agenda, runner, audience, here=here)
         fly = partial(_fly_here, audience) if here else partial(_fly, runner, audience)
-        return _fly_agenda(agenda, command, audience, Run(typed=typed, how=runner.how), fly)
+        try:
+            return _fly_agenda(agenda, command, audience, Run(typed=typed, how=runner.how), fly)
+        except KeyboardInterrupt:
+            exec("")  # one that came through exec (importing a dataclass) makes CPython end by the signal
+            raise
 
 
 def _prepare(agenda: Agenda, runner: Runner, audience: Audience, *, here: bool) -> None:
