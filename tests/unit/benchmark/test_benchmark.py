@@ -9,9 +9,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.studies import made_up
 from uavexp.benchmark.__main__ import main
 from uavexp.benchmark.entry import SUITE, entry_of, part_of
-from uavexp.benchmark.standings import WHOLE, in_common, numbers, standings
+from uavexp.benchmark.standings import WHOLE, in_common, numbers, rows_of, standings
 from uavexp.config.composition import Composer
 from uavexp.config.experiment import read_experiment
 from uavexp.config.overrides import parse_settings
@@ -130,3 +131,27 @@ def test_a_table_in_which_only_some_scenes_have_a_truth_is_whole(tmp_path: Path)
     check_table(file, table, {})
     with pytest.raises(RecordError, match="must hold numbers"):
         check_table(file, table.assign(barn_collided=["yes", None]), {})
+
+
+def test_a_scene_that_only_one_has_flown_is_left_out() -> None:
+    made = rows()
+    mine, others = made[made["arm of all axes"] == "mine"], made[made["arm of all axes"] == "MCR"]
+    there = in_common(mine[mine["scene"] != "BARN: 6"], others)
+    assert set(there["scene"]) == {"BARN: 0", "movers: hall"}
+    assert there.groupby("arm of all axes").size().to_dict() == {"mine": 4, "MCR": 4}
+
+
+def test_compute_is_the_sum_of_what_the_plans_cost(tmp_path: Path) -> None:
+    plans = {"wall_search_sum_s": 1.0, "wall_optimise_sum_s": 0.5, "wall_trigger_sum_s": 0.25}
+    row = {"arm": "mine", "seed": 0, "success": True, "status": "ok", "trial": "a", "wall_trial_s": 9.0}
+    made_up(tmp_path, pd.DataFrame([row | plans]), {"arm": ("mine",)})
+    assert rows_of(tmp_path)["compute_s"].tolist() == [1.75]
+
+
+@pytest.mark.parametrize("word", [
+    "seed=0", "experiments=mcr/table1", "world=rooms", "world_seed=1", "movers=none", "mission=reach",
+    "vehicle=point_mass", "sensor=lidar", "sensor.range_m=9", "estimator=perfect", "estimator.drift=0",
+])  # fmt: skip
+def test_what_is_the_suites_is_refused(word: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["trigger=mcr", word, "runner.dry_run=true"]) == 2
+    assert "the suite's own, the same for every entry" in capsys.readouterr().err

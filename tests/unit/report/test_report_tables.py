@@ -560,3 +560,29 @@ def test_numbers_never_read_minus_zero() -> None:
     assert number_format.signed(0.006, 2) == "+0.01"
     assert number_format.number(math.nan, 2) == number_format.NONE
     assert number_format.p_value(0.0004) == "<0.001"
+
+
+def test_a_metric_of_two_scenes_of_ten_has_the_interval_of_two(trials: pd.DataFrame) -> None:
+    """With two units Student's t asks for all that was resampled."""
+    few = trials.copy()
+    few.loc[few["scene"] > "scene 1", "min_clearance_m"] = math.nan
+    panel = Results(study=study_of(few)).panel
+    means = panel.samples(labels.CLEARANCE)[:, panel.arms.index("MCR")]
+    ends = estimate(panel, labels.CLEARANCE, "MCR").interval
+    assert ends == pytest.approx((np.nanmin(means), np.nanmax(means)))
+
+
+def test_a_difference_of_two_scenes_of_ten(trials: pd.DataFrame) -> None:
+    few = trials.copy()
+    few.loc[few["scene"] > "scene 1", "min_clearance_m"] = math.nan
+    panel = Results(study=study_of(few)).panel
+    pairs = pairs_of(panel, "MCR", "TBR", [labels.CLEARANCE])
+    means = pairs.samples[labels.CLEARANCE.column]
+    assert compare(pairs, labels.CLEARANCE).interval == pytest.approx((np.nanmin(means), np.nanmax(means)))
+
+
+def test_flights_that_were_lost_bound_no_count() -> None:
+    trials = trials_of({"MCR": GOOD})
+    trials.loc[:9, "collision_count"] = math.nan
+    panel = Results(study=study_of(trials)).panel
+    assert estimate(panel, labels.CONTACTS, "MCR").interval.high == pytest.approx(-math.log(0.025) / 50)

@@ -51,7 +51,7 @@ def test_a_claim_that_holds_alone_need_not_hold_among_many(trials: pd.DataFrame)
     assert all("Holm over the 4 claims" in one.evidence for one in together)
 
 
-@pytest.mark.parametrize(("failed", "is_told"), [(0.4, True), (0.6, False)])
+@pytest.mark.parametrize(("failed", "is_told"), [(0.4, True), (0.5, True), (0.6, False)])
 def test_what_needs_arrival_is_a_dash_where_most_flights_failed(
     trials: pd.DataFrame, failed: float, is_told: bool
 ) -> None:

@@ -255,3 +255,19 @@ def test_wilcoxons_test_of_few_pairs_is_scipys_with_ties_or_without(differences:
     values = np.array(differences)
     expected = stats.wilcoxon(values[values != 0.0]).pvalue
     assert significance.wilcoxon_p(values) == pytest.approx(expected)
+
+
+def test_of_many_scenes_the_other_side_is_no_evidence() -> None:
+    differences, scene = np.random.default_rng(5).normal(0.6, 1.0, 60), np.arange(60)
+    greater, less = (significance.sign_flip_p(differences, scene, side) for side in ("greater", "less"))
+    assert greater < 0.01
+    assert less == pytest.approx(1.0 - greater)
+
+
+def test_a_resample_without_a_value_is_left_out_of_the_percentiles() -> None:
+    every = np.arange(1000.0)
+    samples = np.column_stack([every, np.where(every % 10, every, math.nan), np.full(1000, math.nan)])
+    low, high = statistics.percentile_interval(samples, 10)
+    assert (low[1], high[1]) == pytest.approx((low[0], high[0]), abs=10.0)
+    assert math.isnan(low[2])
+    assert math.isnan(high[2])

@@ -12,7 +12,7 @@ import pytest
 
 from uavexp.paths import experiments_folder
 from uavexp.results import __main__ as command
-from uavexp.results.changes import changes, verdict_changes
+from uavexp.results.changes import changes, is_the_same, verdict_changes
 from uavexp.results.listed import listed
 from uavexp.store.records import code_digest
 
@@ -103,3 +103,58 @@ def test_what_changed_is_told_once_and_stays_told(tmp_path: Path, monkeypatch: p
     assert "TBR: Path length" in told
     assert command.main([]) == 0
     assert (flown.parents[1] / "changes.md").read_text() == told
+
+
+def test_a_change_in_other_seeds_is_found_unpaired(tmp_path: Path) -> None:
+    now = altered(
+        tmp_path / "now", seed=lambda values: values + 1000, path_length_m=lambda values: values + 3.0
+    )
+    beyond = [change for change in changes(COMMITTED, now) if change.p < 0.05]
+    assert [(one.arm, one.metric.column, one.pairs) for one in beyond] == [(ARM, "path_length_m", 0)]
+
+
+def test_clock_times_are_the_machines(tmp_path: Path) -> None:
+    storeys = experiments_folder() / "real" / "results" / "storeys"
+    assert "wall_" in (storeys / "tables" / "values.csv").read_text()
+    names = {change.metric.column for change in changes(storeys, storeys)}
+    assert names
+    assert not [name for name in names if name.startswith("wall_")]
+
+
+def test_a_part_of_a_study_is_not_the_same(tmp_path: Path) -> None:
+    whole = altered(tmp_path / "whole")
+    part = part_of(altered(tmp_path / "part"), lambda trials: trials["seed"] < 2)
+    assert is_the_same(COMMITTED, whole)
+    assert not is_the_same(COMMITTED, part)
+    assert not is_the_same(part, whole)
+    assert not is_the_same(COMMITTED, tmp_path / "nowhere")
+
+
+def test_a_claim_that_is_new_or_gone_is_told(tmp_path: Path) -> None:
+    now = altered(tmp_path / "now")
+    lines = (now / "claims.csv").read_text().splitlines(keepends=True)
+    (now / "claims.csv").write_text("".join(lines[:-1]))
+    (gone,) = verdict_changes(COMMITTED, now)
+    assert gone.endswith(" -> not judged")
+    (new,) = verdict_changes(now, COMMITTED)
+    assert ": not judged -> " in new
+
+
+def test_what_was_not_flown_to_its_end_is_not_put_in_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    flown = tmp_path / "outputs" / "results" / code_digest()[:8] / "mcr" / "table1"
+    there = tmp_path / "there"
+    shutil.copytree(COMMITTED, there)
+    before = (there / "trials.parquet").read_bytes()
+    one = next(one for one in listed() if one.study == "mcr/table1")
+    monkeypatch.setattr(command, "listed", lambda share: [one])
+    monkeypatch.setattr(command, "committed", lambda study: there)
+    monkeypatch.setattr(command, "outputs_root", lambda: tmp_path / "outputs")
+    monkeypatch.setattr(command, "_fly", lambda study, folder: False)
+    monkeypatch.setattr(command.subprocess, "run", lambda *words, **how: None)
+    altered(flown, path_length_m=lambda values: values + 3.0, code=lambda values: "another")
+    assert command.main([]) == 1
+    assert "not flown to their end: mcr/table1" in capsys.readouterr().out
+    assert ", not flown to its end" in (flown.parents[1] / "changes.md").read_text()
+    assert (there / "trials.parquet").read_bytes() == before

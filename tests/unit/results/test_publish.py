@@ -103,3 +103,11 @@ def test_committed_results_are_small_and_hold_no_page() -> None:
     assert sum(file.stat().st_size for file in files) <= MOST_BYTES
     assert {file.suffix for file in files} <= {".json", ".parquet", ".csv", ".md", ".png"}
     assert experiments_folder() == ROOT / "experiments"
+
+
+def test_what_an_interrupted_publishing_left_is_not_published(flown: Path, tmp_path: Path) -> None:
+    left = tmp_path / ".there.part" / "tables"
+    left.mkdir(parents=True)
+    (left / "old.csv").write_text("stale")
+    publish(flown, tmp_path / "there")
+    assert not (tmp_path / "there/tables/old.csv").exists()

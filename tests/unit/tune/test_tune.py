@@ -14,8 +14,8 @@ from uavexp.config.composition import Composer
 from uavexp.errors import ConfigError
 from uavexp.tune.__main__ import task_of
 from uavexp.tune.objective import front, means, objectives
-from uavexp.tune.search import _study
-from uavexp.tune.space import Choice, Range, label_of, split
+from uavexp.tune.search import _cells, _study
+from uavexp.tune.space import Choice, Range, label_of, split, wholes_checked
 
 optuna = pytest.importorskip("optuna", reason="tuning is an extra: pip install 'uavexp[tune]'")
 TBR = ("tune", *QUICK, "strategy=tbr", "trigger.interval_s=0.2:6", "seed=100:102", "runner.n_jobs=1")
@@ -137,3 +137,33 @@ def test_a_parameter_that_does_not_exist_is_told(capsys: pytest.CaptureFixture[s
     error = capsys.readouterr().err
     assert "trigger.intervall_s: option tbr of trigger has no parameter" in error
     assert "did you mean" in error
+
+
+def test_a_share_of_a_range_lies_as_far_in_it() -> None:
+    even = Range(key="x", low=2.0, high=6.0, is_log=False, is_whole=False)
+    assert [even.at(share) for share in (0.0, 0.5, 1.0)] == [2.0, 4.0, 6.0]
+    log = Range(key="x", low=1.0, high=100.0, is_log=True, is_whole=True)
+    assert [log.at(share) for share in (0.0, 0.5, 1.0)] == pytest.approx([1, 10, 100])
+    three = Choice(key="x", values=("a", "b", "c"))
+    assert [three.at(share) for share in (0.0, 0.34, 0.99)] == ["a", "b", "c"]
+
+
+def test_more_of_what_is_better_is_asked_for_and_less_of_what_is_worse() -> None:
+    words = ["strategy=tbr", "trigger.interval_s=1:5", "objective=success,min_clearance_m,replans"]
+    directions = [direction.name for direction in _study(task_of(words, Composer())).directions]
+    assert directions == ["MAXIMIZE", "MAXIMIZE", "MINIMIZE"]
+
+
+def test_what_is_tried_goes_before_what_the_arm_has() -> None:
+    composer = Composer()
+    task = task_of(["experiments=mcr/table1", "arm=TBR", "trigger.interval_s=0.5:5"], composer)
+    cells = list(_cells(task.base, composer, "interval_s=1.25", {"trigger.interval_s": 1.25}))
+    assert len(cells) == len(task.base.cells)
+    assert {cell.config["trigger"]["interval_s"] for cell in cells} == {1.25}
+
+
+def test_a_whole_number_stays_one() -> None:
+    item = Range(key="x", low=1.0, high=10.0, is_log=False, is_whole=True)
+    for default, is_whole in ((3, True), (3.0, False), (True, False), (None, False)):
+        (checked,) = wholes_checked([item], {"x": default}.get)
+        assert checked.is_whole is is_whole
