@@ -18,7 +18,7 @@ from tests.studies import shipped
 from uavexp.errors import RecordError
 from uavexp.metrics.evaluate import metric_of
 from uavexp.report import labels, number_format, table_formats
-from uavexp.report.comparison import compare, estimate, pairs_of, panel_of
+from uavexp.report.comparison import Panel, compare, estimate, pairs_of, panel_of
 from uavexp.report.contents import Judgement, Report
 from uavexp.report.derived import with_false_triggers
 from uavexp.report.judges import Verdict
@@ -562,20 +562,23 @@ def test_numbers_never_read_minus_zero() -> None:
     assert number_format.p_value(0.0004) == "<0.001"
 
 
-def test_a_metric_of_two_scenes_of_ten_has_the_interval_of_two(trials: pd.DataFrame) -> None:
-    """With two units Student's t asks for all that was resampled."""
+def of_two_scenes(trials: pd.DataFrame) -> Panel:
+    """Clearance was measured in two scenes of the ten."""
     few = trials.copy()
     few.loc[few["scene"] > "scene 1", "min_clearance_m"] = math.nan
-    panel = Results(study=study_of(few)).panel
+    return Results(study=study_of(few)).panel
+
+
+def test_a_metric_of_two_scenes_of_ten_has_the_interval_of_two(trials: pd.DataFrame) -> None:
+    """With two units Student's t asks for all that was resampled."""
+    panel = of_two_scenes(trials)
     means = panel.samples(labels.CLEARANCE)[:, panel.arms.index("MCR")]
     ends = estimate(panel, labels.CLEARANCE, "MCR").interval
     assert ends == pytest.approx((np.nanmin(means), np.nanmax(means)))
 
 
 def test_a_difference_of_two_scenes_of_ten(trials: pd.DataFrame) -> None:
-    few = trials.copy()
-    few.loc[few["scene"] > "scene 1", "min_clearance_m"] = math.nan
-    panel = Results(study=study_of(few)).panel
+    panel = of_two_scenes(trials)
     pairs = pairs_of(panel, "MCR", "TBR", [labels.CLEARANCE])
     means = pairs.samples[labels.CLEARANCE.column]
     assert compare(pairs, labels.CLEARANCE).interval == pytest.approx((np.nanmin(means), np.nanmax(means)))

@@ -37,6 +37,21 @@ def part_of(folder: Path, rows: Callable[[pd.DataFrame], pd.Series]) -> Path:
     return folder
 
 
+def one_study(folder: Path, monkeypatch: pytest.MonkeyPatch, *, ends: bool) -> tuple[Path, Path]:
+    """A list of one study, flown by other code, to its end or not: where it is flown, where committed."""
+    flown = folder / "outputs" / "results" / code_digest()[:8] / "mcr" / "table1"
+    there = folder / "there"
+    shutil.copytree(COMMITTED, there)
+    one = next(one for one in listed() if one.study == "mcr/table1")
+    monkeypatch.setattr(command, "listed", lambda share: [one])
+    monkeypatch.setattr(command, "committed", lambda study: there)
+    monkeypatch.setattr(command, "outputs_root", lambda: folder / "outputs")
+    monkeypatch.setattr(command, "_fly", lambda study, folder: ends and folder.is_dir())
+    monkeypatch.setattr(command.subprocess, "run", lambda *words, **how: None)
+    altered(flown, path_length_m=lambda values: values + 3.0, code=lambda values: "another")
+    return flown, there
+
+
 def test_the_same_flights_changed_nothing(tmp_path: Path) -> None:
     found = changes(COMMITTED, altered(tmp_path / "now"))
     assert len(found) > 50
@@ -87,16 +102,7 @@ def test_another_verdict_is_told(tmp_path: Path) -> None:
 
 def test_what_changed_is_told_once_and_stays_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The second run finds the study in place; it would compare it with itself."""
-    flown = tmp_path / "outputs" / "results" / code_digest()[:8] / "mcr" / "table1"
-    there = tmp_path / "there"
-    shutil.copytree(COMMITTED, there)
-    one = next(one for one in listed() if one.study == "mcr/table1")
-    monkeypatch.setattr(command, "listed", lambda share: [one])
-    monkeypatch.setattr(command, "committed", lambda study: there)
-    monkeypatch.setattr(command, "outputs_root", lambda: tmp_path / "outputs")
-    monkeypatch.setattr(command, "_fly", lambda study, folder: folder.is_dir())
-    monkeypatch.setattr(command.subprocess, "run", lambda *words, **how: None)
-    altered(flown, path_length_m=lambda values: values + 3.0, code=lambda values: "another")
+    flown, _ = one_study(tmp_path, monkeypatch, ends=True)
     assert command.main([]) == 0
     told = (flown.parents[1] / "changes.md").read_text()
     assert "## mcr/table1" in told
@@ -113,7 +119,7 @@ def test_a_change_in_other_seeds_is_found_unpaired(tmp_path: Path) -> None:
     assert [(one.arm, one.metric.column, one.pairs) for one in beyond] == [(ARM, "path_length_m", 0)]
 
 
-def test_clock_times_are_the_machines(tmp_path: Path) -> None:
+def test_clock_times_are_the_machines() -> None:
     storeys = experiments_folder() / "real" / "results" / "storeys"
     assert "wall_" in (storeys / "tables" / "values.csv").read_text()
     names = {change.metric.column for change in changes(storeys, storeys)}
@@ -143,17 +149,8 @@ def test_a_claim_that_is_new_or_gone_is_told(tmp_path: Path) -> None:
 def test_what_was_not_flown_to_its_end_is_not_put_in_place(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    flown = tmp_path / "outputs" / "results" / code_digest()[:8] / "mcr" / "table1"
-    there = tmp_path / "there"
-    shutil.copytree(COMMITTED, there)
+    flown, there = one_study(tmp_path, monkeypatch, ends=False)
     before = (there / "trials.parquet").read_bytes()
-    one = next(one for one in listed() if one.study == "mcr/table1")
-    monkeypatch.setattr(command, "listed", lambda share: [one])
-    monkeypatch.setattr(command, "committed", lambda study: there)
-    monkeypatch.setattr(command, "outputs_root", lambda: tmp_path / "outputs")
-    monkeypatch.setattr(command, "_fly", lambda study, folder: False)
-    monkeypatch.setattr(command.subprocess, "run", lambda *words, **how: None)
-    altered(flown, path_length_m=lambda values: values + 3.0, code=lambda values: "another")
     assert command.main([]) == 1
     assert "not flown to their end: mcr/table1" in capsys.readouterr().out
     assert ", not flown to its end" in (flown.parents[1] / "changes.md").read_text()
